@@ -1,0 +1,278 @@
+r"""Energies as a person declares them: one short file each, read aloud without stumbling.
+
+.. code-block:: python
+
+    @energy(document="cirio2014.md", section="Stretch", unit="J", domain=r"u_1 > u_0")
+    def stretch(x0: Point, x1: Point, u0: Sliding, u1: Sliding, *, k_s: Positive["N"]):
+        "Squared strain, times the rest length that carries it."
+        ...
+
+Arguments are the unknowns, keywords the parameters; the function returns a tree, so it uses ``+ - * /``, integer powers
+and the measures below, and no floats.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from yarnverify.symbolic.latex import GREEK
+from yarnverify.symbolic.reader import InputError, Source, parse
+from yarnverify.symbolic.tree import PI, Expr, Name
+
+
+class Point:
+    """Annotation of an unknown position: three coordinates, in metres."""
+
+
+class Sliding:
+    """Annotation of an unknown sliding coordinate: rest arc length along a yarn, in metres."""
+
+
+@dataclass(frozen=True)
+class Real:
+    """Annotation of a parameter of any sign: ``Real["rad"]``."""
+
+    unit: str
+    positive: bool = False
+
+    def __class_getitem__(cls, unit: str) -> Real:
+        return cls(unit)
+
+
+class Positive:
+    """Annotation of a parameter that is never negative: ``Positive["N m^2"]``."""
+
+    def __class_getitem__(cls, unit: str) -> Real:
+        return Real(unit, positive=True)
+
+
+def length(a: Expr) -> Expr:
+    """Length of a vector."""
+    return Expr("norm", (a,))
+
+
+def unit(a: Expr) -> Expr:
+    """Direction of a vector."""
+    return Expr("frac", (a, length(a)))
+
+
+def angle(a: Expr, b: Expr) -> Expr:
+    """Angle between two directions, from 0 to pi."""
+    return Expr("call", (Expr("mul", (unit(a).T, unit(b))),), "arccos")
+
+
+def deviation(a: Expr, b: Expr) -> Expr:
+    """How much the angle between two directions exceeds a right angle, from -pi/2 to pi/2."""
+    return angle(a, b) - PI / 2
+
+
+@dataclass(frozen=True)
+class Parameter:
+    name: Name
+    unit: str
+    positive: bool
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """``left > right``, in the notation of the document."""
+
+    left: Expr
+    right: Expr
+    strict: bool = True
+
+
+@dataclass(frozen=True)
+class Energy:
+    """A declared energy.
+
+    Attributes
+    ----------
+    name, document, section, unit, summary
+        What it is, and which section of which document prints it.
+    unknowns, parameters
+        In the order of the function's signature.
+    expression
+        The energy itself.
+    domain
+        Where it is meant; ``removable`` and ``singular`` are the states in which its derivatives need care, or are
+        undefined, in the notation of the document.
+    rest
+        One state of least energy: a value for each unknown (3 for a point), and 1 for each parameter not named.
+    """
+
+    name: str
+    document: str
+    section: str
+    unit: str
+    summary: str
+    unknowns: tuple[Name, ...]
+    parameters: tuple[Parameter, ...]
+    expression: Expr
+    domain: tuple[Assumption, ...] = ()
+    removable: str = ""
+    singular: str = ""
+    rest: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A declared meaning of a symbol of the document; ``section`` is empty where it holds for all sections."""
+
+    symbol: Name
+    document: str
+    section: str
+    unit: str
+    expression: Expr
+    build: Callable[..., Expr] = field(compare=False)
+
+    def __call__(self, *args: Expr) -> Expr:
+        return self.build(*args)
+
+
+_INDEXED = re.compile(r"([A-Za-z]+?)_?(\d+|[ij])\Z")
+
+
+def name_of(identifier: str, bold: bool = False, indexed: bool = False) -> Name:
+    """The symbol that a Python identifier stands for: ``x1`` is x_1, ``k_b`` is k_b, ``theta_0`` is theta_0."""
+    if indexed and (match := _INDEXED.match(identifier)):
+        return Name(match[1], match[2], bold)
+    base, _, sub = identifier.partition("_")
+    return Name(base, sub, bold)
+
+
+def _unknowns(function: Callable[..., Any], hints: dict[str, Any]) -> dict[str, Expr]:
+    found = {}
+    for key, parameter in inspect.signature(function).parameters.items():
+        if parameter.kind is parameter.KEYWORD_ONLY:
+            continue
+        if hints.get(key) not in (Point, Sliding):
+            raise TypeError(f"argument {key!r} of {function.__name__} must be annotated Point or Sliding")
+        found[key] = Expr("symbol", value=name_of(key, hints[key] is Point, indexed=True))
+    return found
+
+
+def _parameters(function: Callable[..., Any], hints: dict[str, Any]) -> dict[str, Parameter]:
+    found = {}
+    for key, parameter in inspect.signature(function).parameters.items():
+        if parameter.kind is not parameter.KEYWORD_ONLY:
+            continue
+        kind = hints.get(key)
+        if not isinstance(kind, Real):
+            raise TypeError(f'parameter {key!r} of {function.__name__} must be annotated Positive["unit"] or Real["unit"]')
+        found[key] = Parameter(name_of(key), kind.unit, kind.positive)
+    return found
+
+
+def assumptions(members: Iterable[Expr], operators: Iterable[str]) -> tuple[Assumption, ...]:
+    """The inequalities of a chain such as ``u_1 > u_0 > u_2``; neighbours that one direction joins are all compared."""
+    members, operators = tuple(members), tuple(operators)
+    found = []
+    for i in range(len(operators)):
+        direction = ""
+        for j in range(i, len(operators)):
+            operator = operators[j]
+            if operator != "=":
+                if direction not in ("", operator[0]):
+                    break
+                direction = operator[0]
+            if direction:
+                left, right = (i, j + 1) if direction == ">" else (j + 1, i)
+                strict = any(len(op) == 1 and op != "=" for op in operators[i : j + 1])
+                found.append(Assumption(members[left], members[right], strict))
+    return tuple(found)
+
+
+def energy(
+    *,
+    document: str = "",
+    section: str = "",
+    unit: str = "J",
+    domain: str = "",
+    removable: str = "",
+    singular: str = "",
+    rest: dict[str, Any] | None = None,
+) -> Callable[[Callable[..., Expr]], Energy]:
+    """Declare an energy; see the module's example and ``Energy`` for what the options mean."""
+
+    def declare(function: Callable[..., Expr]) -> Energy:
+        hints = get_type_hints(function)
+        unknowns, parameters = _unknowns(function, hints), _parameters(function, hints)
+        symbols = {key: Expr("symbol", value=parameter.name) for key, parameter in parameters.items()}
+        name = function.__name__
+        where: list[Assumption] = []
+        if domain:
+            for members, operators in parse(Source(f"domain of {name}", domain), 0, len(domain)):
+                where += assumptions(members, operators)
+        return Energy(
+            name, document, section, unit, inspect.getdoc(function) or "",
+            tuple(node.name for node in unknowns.values()), tuple(parameters.values()),
+            function(**unknowns, **symbols), tuple(where), removable, singular, rest or {},
+        )  # fmt: skip
+
+    return declare
+
+
+def quantity(
+    *, symbol: str, document: str = "", section: str = "", unit: str = "1"
+) -> Callable[[Callable[..., Expr]], Quantity]:
+    """Declare what a symbol of the document means; an argument such as ``x_i`` carries the running index."""
+
+    def declare(function: Callable[..., Expr]) -> Quantity:
+        hints = get_type_hints(function)
+        ((members, _),) = parse(Source(f"symbol of {function.__name__}", symbol), 0, len(symbol))
+        return Quantity(
+            members[0].name, document, section, unit, function(**_unknowns(function, hints)), function
+        )
+
+    return declare
+
+
+@dataclass(frozen=True)
+class Declarations:
+    """All that one folder of derivations declares."""
+
+    energies: tuple[Energy, ...] = ()
+    quantities: tuple[Quantity, ...] = ()
+
+
+def load_declarations(folder: Path) -> Declarations:
+    """Run the Python files of a folder, in alphabetical order, and collect what they declare.
+
+    Raises
+    ------
+    InputError
+        Where a file does not run.
+    """
+    energies: dict[str, Energy] = {}
+    quantities: list[Quantity] = []
+    for path in sorted(folder.glob("*.py")):
+        namespace: dict[str, Any] = {"__name__": path.stem, "__file__": str(path)}
+        try:
+            exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), namespace)
+        except InputError:
+            raise
+        except SyntaxError as error:
+            raise InputError(str(path), error.lineno or 1, error.offset or 1, error.msg) from None
+        except Exception as error:
+            lines = [frame.lineno for frame in inspect.getinnerframes(error.__traceback__) if frame.filename == str(path)]  # type: ignore[arg-type]
+            raise InputError(str(path), lines[-1] if lines else 1, 1, f"{type(error).__name__}: {error}") from None
+        for value in namespace.values():
+            if isinstance(value, Energy):
+                if value.name in energies:
+                    raise InputError(str(path), 1, 1, f"energy {value.name!r} is declared twice")
+                energies[value.name] = value
+            elif isinstance(value, Quantity):
+                quantities.append(value)
+    return Declarations(tuple(energies.values()), tuple(quantities))
+
+
+__all__ = [
+    "GREEK", "Assumption", "Declarations", "Energy", "Parameter", "Point", "Positive", "Quantity", "Real", "Sliding",
+    "angle", "assumptions", "deviation", "energy", "length", "load_declarations", "name_of", "quantity", "unit",
+]  # fmt: skip

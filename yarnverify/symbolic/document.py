@@ -1,0 +1,344 @@
+"""What a document states: definitions, assumptions, one energy a section, and claims.
+
+A chain ``A = B = -C`` is several claims: every member but the last is claimed to equal the last.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+
+from yarnverify.symbolic.declare import Assumption, Energy, assumptions
+from yarnverify.symbolic.latex import latex, name_latex
+from yarnverify.symbolic.reader import Heading, Relation, Source, read
+from yarnverify.symbolic.tree import Expr, Name, ShapeError, Type, is_zero, rebuild, type_of
+
+_INDEX = re.compile(r"(?:\d+|[a-z]|[a-z][+-]\d+)\Z")
+
+
+@dataclass(frozen=True)
+class Definition:
+    """``symbol = expression``; with a running index, ``index`` is its letter and the definition holds for every value."""
+
+    symbol: Name
+    expression: Expr
+    relation: Relation
+    index: str = ""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """``left = right``, to be proved or refuted; ``member`` is the place of ``left`` in its chain."""
+
+    block: str
+    left: Expr
+    right: Expr
+    relation: Relation
+    member: int
+
+
+@dataclass
+class Section:
+    """A section with everything that holds in it, shared definitions included."""
+
+    title: str
+    offset: int
+    shared: Section | None = None
+    definitions: dict[Name, Definition] = field(default_factory=dict)
+    assumptions: list[Assumption] = field(default_factory=list)
+    energy: Definition | None = None
+    claims: list[Claim] = field(default_factory=list)
+    parameters: tuple[Name, ...] = ()
+    unknowns: tuple[Name, ...] = ()
+    declared: Energy | None = None
+    _families: set[tuple[str, bool]] = field(default_factory=lambda: {("x", True), ("u", False), ("v", False)})
+
+    def definition(self, name: Name) -> Definition | None:
+        """The definition behind a symbol: its own, or that of its family with a running index."""
+        found = self.definitions.get(name)
+        if found is None and _INDEX.match(name.sub):
+            for candidate in self.definitions.values():
+                symbol = candidate.symbol
+                if candidate.index and (symbol.base, symbol.bold) == (name.base, name.bold):
+                    return candidate
+        if found is None and self.shared is not None:
+            return self.shared.definition(name)
+        return found
+
+    def meaning(self, name: Name) -> Expr | None:
+        """The tree that a defined symbol stands for, its running index filled in; None where nothing defines it."""
+        found = self.definition(name)
+        if found is None:
+            return None
+        if not found.index or name.sub == found.index:
+            return found.expression
+        return instantiate(found.expression, found.index, name.sub)
+
+    def is_unknown(self, name: Name) -> bool:
+        """Whether a symbol is a degree of freedom of some crossing: x_1, u_0, v_3, and families like them."""
+        return (name.base, name.bold) in self._families and bool(_INDEX.match(name.sub))
+
+    def undefined(self, expr: Expr) -> list[Name]:
+        """Symbols under a tree that nothing defines, followed through definitions, in printed order."""
+        found: dict[Name, None] = {}
+        seen: set[Name] = set()
+
+        def visit(node: Expr) -> None:
+            for part in node.walk():
+                if part.op == "derivative" and not self.is_unknown(part.name):
+                    found.setdefault(part.name)
+                if part.op == "force" and not self.is_unknown(part.name):
+                    found.setdefault(part.name)
+                if part.op != "symbol" or part.name in seen:
+                    continue
+                seen.add(part.name)
+                meaning = self.meaning(part.name)
+                if meaning is not None:
+                    visit(meaning)
+                elif not self.is_unknown(part.name) and part.name not in self.parameters:
+                    found.setdefault(part.name)
+
+        visit(expr)
+        return list(found)
+
+    def lookup(self, name: Name, _open: tuple[Name, ...] = ()) -> Type:
+        """Shape of a symbol."""
+        meaning = self.meaning(name)
+        if meaning is not None:
+            if name in _open:
+                raise ShapeError(meaning, f"{name_latex(name)} is defined by itself")
+            return type_of(meaning, lambda inner: self.lookup(inner, (*_open, name)))
+        if self.is_unknown(name):
+            return Type.VECTOR if name.bold else Type.SCALAR
+        if name in self.parameters:
+            return Type.VECTOR if name.bold else Type.SCALAR
+        return Type.UNKNOWN
+
+    def type_of(self, expr: Expr) -> Type:
+        return type_of(expr, self.lookup)
+
+    def expand(self, expr: Expr) -> Expr:
+        """A tree with every defined symbol replaced by what it stands for."""
+
+        def change(node: Expr) -> Expr | None:
+            meaning = self.meaning(node.name) if node.op == "symbol" else None
+            return None if meaning is None else self.expand(meaning)
+
+        return rebuild(expr, change)
+
+    def base_symbols(self, expr: Expr) -> list[Name]:
+        """Unknowns, parameters and undefined symbols under a tree, in order of appearance."""
+        named = {"symbol", "force", "derivative"}
+        return list(dict.fromkeys(node.name for node in self.expand(expr).walk() if node.op in named))
+
+
+@dataclass(frozen=True)
+class Document:
+    """A document read whole: the shared preamble and its sections, in printed order."""
+
+    source: Source
+    shared: Section
+    sections: tuple[Section, ...]
+    relations: tuple[Relation, ...]
+
+    @property
+    def equations(self) -> tuple[str, ...]:
+        """Printed numbers, in order."""
+        return tuple(dict.fromkeys(r.equation for r in self.relations if not r.inline))
+
+
+def instantiate(expr: Expr, letter: str, value: str) -> Expr:
+    """A tree with the running index ``letter`` set to ``value``; ``i+1`` is counted up where the value is a number."""
+
+    def sub(name: Name) -> Name:
+        if name.sub == letter:
+            return name.with_sub(value)
+        if re.fullmatch(rf"{letter}[+-]\d+", name.sub):
+            shift = int(name.sub[1:])
+            return name.with_sub(str(int(value) + shift) if value.isdigit() else value + name.sub[1:])
+        return name
+
+    def change(node: Expr) -> Expr | None:
+        if node.op in {"symbol", "force", "derivative"}:
+            args = tuple(rebuild(arg, change) for arg in node.args)
+            return replace(node, value=sub(node.name), args=args)
+        return None
+
+    return rebuild(expr, change)
+
+
+def block_of(expr: Expr) -> str:
+    """Name of the block that a member of a chain is, such as ``dF_x1/dx0``; empty where it is not one."""
+    while expr.op == "neg":
+        expr = expr.args[0]
+    match expr.op:
+        case "force":
+            return f"F_{expr.name.label}"
+        case "energy":
+            return "V"
+        case "symbol":
+            return str(expr.name)
+        case "derivative":
+            return f"d{block_of(expr.args[0])}/d{expr.name.label}"
+    return ""
+
+
+def _running_index(symbol: Name, expression: Expr) -> str:
+    letter = symbol.sub
+    if not (len(letter) == 1 and letter.isalpha()):
+        return ""
+    uses = any(
+        node.op == "symbol" and (node.name.sub == letter or re.fullmatch(rf"{letter}[+-]\d+", node.name.sub))
+        for node in expression.walk()
+    )
+    return letter if uses else ""
+
+
+def _states_mechanics(expr: Expr) -> bool:
+    """Whether the tree speaks of forces, energies or derivatives, so that it can only be a claim."""
+    return any(node.op in {"force", "energy", "derivative"} for node in expr.walk())
+
+
+def _sections(source: Source, items: list[Heading | Relation]) -> tuple[Section, list[tuple[Section, list[Relation]]]]:
+    """Group relations under headings: a lone top heading is the title, deeper headings belong to the section above."""
+    headings = [item for item in items if isinstance(item, Heading)]
+    titles = [h for h in headings if h.level == headings[0].level]
+    has_title = len(titles) == 1 and any(h.level > titles[0].level for h in headings)
+    rest = [h for h in headings if not (has_title and h is titles[0])]
+    level = min((h.level for h in rest), default=0)
+    shared = Section("", 0)
+    groups: list[tuple[Section, list[Relation]]] = [(shared, [])]
+    for item in items:
+        if isinstance(item, Relation):
+            groups[-1][1].append(item)
+        elif item in rest and item.level == level:
+            groups.append((Section(item.title, item.offset, shared), []))
+    return shared, groups
+
+
+def read_document(
+    source: Source, declare: Callable[[Section], Energy | None] = lambda section: None
+) -> Document:
+    """Read a document into sections with definitions, energies and claims.
+
+    Parameters
+    ----------
+    source
+        The document's text.
+    declare
+        Gives the declared energy of a section, or None.
+
+    Raises
+    ------
+    InputError
+        For anything that cannot be read, wrong shapes, circular definitions, and sections without an energy.
+    """
+    items = list(read(source))
+    shared, groups = _sections(source, items)
+    relations = tuple(item for item in items if isinstance(item, Relation))
+    if not relations:
+        source.fail(0, "the document has no numbered formulas: displays are written $$ ... \\quad (7)$$")
+    sections = []
+    for section, own in groups:
+        section.declared = declare(section)
+        pending = _definitions(section, own)
+        if section is shared:
+            for relation in pending:
+                first = relation.members[0]
+                what = "an energy" if first.op == "energy" else "a claim"
+                source.fail(relation.offset, f"equation ({relation.equation}) states {what} before the first section heading")
+            continue
+        only_definitions = bool(own) and not pending and section.energy is None
+        if only_definitions:
+            shared.definitions.update(section.definitions)
+            shared.assumptions.extend(section.assumptions)
+            continue
+        if section.energy is None:
+            source.fail(section.offset, f"section '{section.title}' has no energy: it needs a numbered display V = ...")
+        _unknowns(section, own)
+        for relation in pending:
+            section.claims += _claims(relation)
+        sections.append(section)
+    if not sections:
+        source.fail(0, "the document has no section with an energy: it needs a heading and a numbered display V = ...")
+    document = Document(source, shared, tuple(sections), relations)
+    _check_shapes(document, groups)
+    return document
+
+
+def _definitions(section: Section, own: Iterable[Relation]) -> list[Relation]:
+    """Take definitions, assumptions and the energy out of a section's relations; what is left are claims."""
+    left = []
+    for relation in own:
+        section.assumptions += assumptions(relation.members, relation.operators)
+        count = next((i for i, op in enumerate(relation.operators) if op != "="), len(relation.operators))
+        if count == 0:
+            continue
+        equal = replace(relation, members=relation.members[: count + 1], operators=relation.operators[:count])
+        first, second = equal.members[:2]
+        if first.op == "energy" and section.energy is None and not section.title == "":
+            section.energy = Definition(first.name, second, equal)
+        elif (
+            first.op == "symbol"
+            and section.definition(first.name) is None
+            and not (section.is_unknown(first.name) and first.name.sub.isdigit())
+            and not any(_states_mechanics(member) for member in equal.members)
+        ):
+            index = _running_index(first.name, second)
+            section.definitions[first.name] = Definition(first.name, second, equal, index)
+        else:
+            left.append(equal)
+            continue
+        if count > 1:
+            left.append(replace(equal, members=equal.members[1:], operators=equal.operators[1:], offset=second.span[0]))
+    return left
+
+
+def _unknowns(section: Section, own: Iterable[Relation]) -> None:
+    """Settle what the section's unknowns and parameters are: as declared, or as its printed energy has them."""
+    assert section.energy is not None
+    named = {node.name for r in own for m in r.members for node in m.walk() if node.op in {"force", "derivative"}}
+    section._families |= {(name.base, name.bold) for name in named if _INDEX.match(name.sub)}
+    base = section.base_symbols(section.energy.expression)
+    if section.declared is not None:
+        section.parameters = tuple(parameter.name for parameter in section.declared.parameters)
+        section.unknowns = section.declared.unknowns
+        section._families |= {(name.base, name.bold) for name in section.unknowns}
+        if not section.assumptions:
+            section.assumptions = list(section.declared.domain)
+        return
+    section._families |= {(n.base, n.bold) for n in base if n.bold and _INDEX.match(n.sub)}
+    section.parameters = tuple(name for name in base if not section.is_unknown(name))
+    section.unknowns = tuple(sorted((n for n in base if section.is_unknown(n)), key=lambda n: (not n.bold, n.base, n.sub)))
+
+
+def _claims(relation: Relation) -> list[Claim]:
+    *members, last = relation.members
+    return [
+        Claim(block_of(member) or block_of(last) or latex(member), member, last, relation, index)
+        for index, member in enumerate(members)
+    ]
+
+
+def _check_shapes(document: Document, groups: list[tuple[Section, list[Relation]]]) -> None:
+    """Every member of every relation has a shape, and those of an inequality are scalars."""
+    for section, own in groups:
+        for relation in own:
+            try:
+                kinds = [section.type_of(member) for member in relation.members]
+            except ShapeError as error:
+                document.source.fail(error.span[0], f"equation ({relation.equation}): {error.message}" if not relation.inline else error.message)
+            for operator, member, kind in zip(relation.operators, relation.members[1:], kinds[1:], strict=True):
+                if operator != "=" and kind not in (Type.SCALAR, Type.UNKNOWN):
+                    document.source.fail(member.span[0], f"cannot compare a {kind.value} by {operator}")
+        energy = section.energy
+        if energy is not None and section.type_of(energy.expression) not in (Type.SCALAR, Type.UNKNOWN):
+            document.source.fail(energy.expression.span[0], "an energy is a scalar")
+
+
+def same_shape(section: Section, claim: Claim) -> tuple[Type, Type, bool]:
+    """Shapes of both sides of a claim, and whether they may be equal; the printed 0 fits every shape."""
+    left, right = section.type_of(claim.left), section.type_of(claim.right)
+    fits = left is right or Type.UNKNOWN in (left, right) or is_zero(claim.left) or is_zero(claim.right)
+    return left, right, fits

@@ -1,0 +1,596 @@
+"""Reading 1: exact normal forms and exact derivatives, in SymPy's sparse polynomials.
+
+A value is a quotient ``numerator / product of factors`` over named atoms. Points are written in the coordinates of the
+identities at hand: with x_b the first point, ``x_i = x_b + l_i a_i``, where ``a_i`` is a unit vector, so that a length is a
+generator instead of a square root. The map (x_b, l_i, a_i) -> (x_b, x_i) covers all states with l_i > 0; an identity in
+these coordinates therefore holds wherever the lengths are not zero. Relations:
+
+* ``a_iz^2 = 1 - a_ix^2 - a_iy^2``,
+* ``r^2 = R`` for every other square root ``r = sqrt(R)``, the sine of ``arccos(c)`` among them with ``R = 1 - c^2``,
+* ``S^2 = 1 - C^2`` for the sine and cosine of an angle that is not an arc cosine.
+
+Their leading monomials are pure powers of distinct generators, so they are a Groebner basis for the lexicographic order in
+which later atoms are larger, and the remainder of a numerator is its normal form: it is zero if and only if the polynomial
+lies in the ideal of the relations. Zero therefore proves equality (angles and pi stay free generators, for which the
+identity holds whatever their values). A remainder that is not zero proves nothing by itself; see ``prove``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from math import prod
+from typing import Any
+
+from sympy import QQ
+from sympy.polys.orderings import lex
+from sympy.polys.rings import PolyElement, ring
+
+from yarnverify.symbolic.document import Section
+from yarnverify.symbolic.tree import Expr, Name
+
+Poly = PolyElement
+_SPARE = 12  # generators kept free for square roots and angles that are met on the way
+
+
+class UnsupportedError(Exception):
+    """A formula that this reading cannot decide; the reason is for the user."""
+
+
+@dataclass(frozen=True, eq=False)
+class Quotient:
+    """``numerator / product of factor^power``, numerator reduced by the field's relations."""
+
+    field: Field
+    numerator: Poly
+    factors: tuple[tuple[Poly, int], ...] = ()
+
+    def _lift(self, other: Quotient | int) -> Quotient:
+        return other if isinstance(other, Quotient) else self.field.constant(other)
+
+    def __add__(self, other: Quotient | int) -> Quotient:
+        other = self._lift(other)
+        if not other.numerator:
+            return self
+        if not self.numerator:
+            return other
+        if self.factors == other.factors:
+            return self.field.quotient(self.numerator + other.numerator, self.factors)
+        mine, theirs = dict(self.factors), dict(other.factors)
+        common = {f: max(mine.get(f, 0), theirs.get(f, 0)) for f in (*mine, *theirs)}
+        left, right = self.numerator, other.numerator
+        for factor, power in common.items():
+            left = self.field.times_power(left, factor, power - mine.get(factor, 0))
+            right = self.field.times_power(right, factor, power - theirs.get(factor, 0))
+        return self.field.quotient(left + right, tuple(common.items()))
+
+    __radd__ = __add__
+
+    def __neg__(self) -> Quotient:
+        return Quotient(self.field, -self.numerator, self.factors)
+
+    def __sub__(self, other: Quotient | int) -> Quotient:
+        return self + (-self._lift(other))
+
+    def __rsub__(self, other: int) -> Quotient:
+        return self._lift(other) + (-self)
+
+    def __mul__(self, other: Quotient | int) -> Quotient:
+        other = self._lift(other)
+        if not self.numerator or not other.numerator:
+            return self.field.constant(0)
+        factors = dict(self.factors)
+        for factor, power in other.factors:
+            factors[factor] = factors.get(factor, 0) + power
+        return self.field.quotient(self.field.reduce(self.numerator * other.numerator), tuple(factors.items()))
+
+    __rmul__ = __mul__
+
+    def inverse(self) -> Quotient:
+        if not self.numerator:
+            raise ZeroDivisionError
+        content, parts = self.field.factor(self.numerator)
+        top = self.field.ring(1) / content
+        for factor, power in self.factors:
+            top = self.field.times_power(top, factor, power)
+        return self.field.quotient(top, parts)
+
+    def __truediv__(self, other: Quotient | int) -> Quotient:
+        return self * self._lift(other).inverse()
+
+    def __rtruediv__(self, other: int) -> Quotient:
+        return self._lift(other) * self.inverse()
+
+    def __pow__(self, exponent: int) -> Quotient:
+        if exponent < 0:
+            return self.inverse() ** -exponent
+        result = self.field.constant(1)
+        for _ in range(exponent):
+            result = result * self
+        return result
+
+    @property
+    def is_zero(self) -> bool:
+        return not self.numerator
+
+
+Value = Any  # a Quotient, a list of 3, or a list of 3 lists of 3, as the shape has it
+
+
+class Field:
+    """The quotients of one section: generators for its symbols, values of its trees, and their derivatives.
+
+    Parameters
+    ----------
+    section
+        Where symbols get their meaning, and the assumptions that settle signs.
+    symbols
+        All unknowns and parameters that may appear.
+    positive
+        Parameters that are never negative.
+    """
+
+    def __init__(self, section: Section, symbols: Iterable[Name], positive: Iterable[Name] = ()) -> None:
+        self.section = section
+        names = sorted(set(symbols), key=lambda n: (not n.bold, n.base, n.sub))
+        self._points = [n for n in names if n.bold]
+        self._scalars = [n for n in names if not n.bold]
+        labels: list[str] = [f"spare{i}" for i in range(_SPARE)]
+        for name in self._points[1:]:
+            labels += [f"{name.label}.{axis}" for axis in "zyx"]
+        labels += [f"length({name.label})" for name in self._points[1:]]
+        labels += [f"{name.label}.{axis}" for name in self._points[:1] for axis in "xyz"]
+        labels += [str(name) for name in self._scalars]
+        self.ring, *generators = ring(labels, QQ, lex)
+        self._generator = dict(zip(labels, generators, strict=True))
+        self._position = {label: i for i, label in enumerate(labels)}
+        self._spare = iter(labels[:_SPARE][::-1])  # a later atom is larger than those in its square
+        # generator -> (position, polynomial of its square), larger generators first
+        self._squares: dict[str, Poly] = {}
+        self._positive = {f"length({name.label})" for name in self._points} | {str(name) for name in positive}
+        self._rules: dict[str, Callable[[str, Name, int], Quotient]] = {}
+        self._roots: dict[Poly, str] = {}
+        self._factored: dict[Poly, tuple[Any, tuple[tuple[Poly, int], ...]]] = {}
+        self._angles: list[tuple[Quotient, Quotient]] = []  # (cosine, angle)
+        self._circles: list[tuple[Quotient, Quotient, Quotient]] = []  # (angle, sine, cosine)
+        self._values: dict[Name, Value] = {}
+        self._derivatives: dict[tuple[str, Name, int], Quotient] = {}
+        self._direction = {name: [self._make(f"{name.label}.{axis}") for axis in "xyz"] for name in self._points[1:]}
+        for name in self._points[1:]:
+            x, y, _ = (a.numerator for a in self._direction[name])
+            self._squares[f"{name.label}.z"] = 1 - x**2 - y**2
+
+    # -- values ---------------------------------------------------------------------------------------------------
+
+    def _make(self, label: str) -> Quotient:
+        return Quotient(self, self._generator[label])
+
+    def constant(self, value: Any) -> Quotient:
+        return Quotient(self, self.ring(QQ(value)))
+
+    def reduce(self, poly: Poly) -> Poly:
+        """Remainder by the relations."""
+        for label in self._order:
+            position, square = self._position[label], self._squares[label]
+            if not any(monomial[position] > 1 for monomial in poly):
+                continue
+            parts: dict[int, Any] = {}
+            for monomial, coefficient in poly.items():
+                half, odd = divmod(monomial[position], 2)
+                rest = (*monomial[:position], odd, *monomial[position + 1 :])
+                part = parts.setdefault(half, {})
+                part[rest] = part.get(rest, QQ(0)) + coefficient
+            total, power, at = self.ring(0), self.ring(1), 0
+            for half in sorted(parts):
+                for _ in range(half - at):
+                    power = power * square
+                at = half
+                total = total + self.ring.from_dict({m: c for m, c in parts[half].items() if c}) * power
+            poly = total
+        return poly
+
+    @cached_property
+    def _order(self) -> list[str]:
+        return sorted(self._squares, key=self._position.__getitem__)
+
+    def quotient(self, numerator: Poly, factors: tuple[tuple[Poly, int], ...]) -> Quotient:
+        """A value in which powers of plain generators are cancelled, so that degrees stay low."""
+        if not numerator:
+            return Quotient(self, numerator)
+        kept = []
+        for factor, power in factors:
+            if power and len(factor) == 1:
+                (position,) = (i for i, e in enumerate(factor.LM) if e)
+                shared = min(power, min(monomial[position] for monomial in numerator))
+                if shared:
+                    numerator = self.ring.from_dict(
+                        {(*m[:position], m[position] - shared, *m[position + 1 :]): c for m, c in numerator.items()}
+                    )
+                    power -= shared
+            if power:
+                kept.append((factor, power))
+        return Quotient(self, numerator, tuple(kept))
+
+    def times_power(self, poly: Poly, factor: Poly, power: int) -> Poly:
+        for _ in range(power):
+            poly = self.reduce(poly * factor)
+        return poly
+
+    def factor(self, poly: Poly) -> tuple[Any, tuple[tuple[Poly, int], ...]]:
+        """Rational content, and factors with their powers."""
+        if len(poly) == 1:
+            monomial, content = poly.LM, poly.LC
+            return content, tuple((self.ring.gens[i], e) for i, e in enumerate(monomial) if e)
+        if poly not in self._factored:
+            content, parts = poly.factor_list()
+            self._factored[poly] = content, tuple(parts)
+        return self._factored[poly]
+
+    # -- roots, absolute values, angles ---------------------------------------------------------------------------
+
+    def _atom(self, square: Poly | None, rule: Callable[[str, Name, int], Quotient], positive: bool) -> str:
+        label = next(self._spare, None)
+        if label is None:
+            raise UnsupportedError("more square roots and angles in one section than can be held apart")
+        if square is not None:
+            self._squares[label] = square
+            self.__dict__.pop("_order", None)
+        self._rules[label] = rule
+        if positive:
+            self._positive.add(label)
+        return label
+
+    def sign(self, poly: Poly) -> int:
+        """Sign of a polynomial as far as the assumptions settle it: 1, -1, or 0 for not known."""
+        if len(poly) == 1:
+            odd = [self.ring.symbols[i].name for i, e in enumerate(poly.LM) if e % 2]
+            if all(name in self._positive for name in odd):
+                return 1 if poly.LC > 0 else -1
+        for known in self._known_positive:
+            ratio = poly.LC / known.LC
+            if poly == known * ratio:
+                return 1 if ratio > 0 else -1
+        return 0
+
+    @cached_property
+    def _known_positive(self) -> list[Poly]:
+        found = []
+        for assumption in self.section.assumptions:
+            difference = self.value(assumption.left) - self.value(assumption.right)
+            if not difference.factors and difference.numerator:
+                found.append(difference.numerator)
+        return found
+
+    def absolute(self, value: Quotient) -> Quotient:
+        """Absolute value, by sign where it is known, else as a root of the square."""
+        result = self.constant(1)
+        content, parts = self.factor(value.numerator)
+        result = result * abs(content)
+        for part, power, invert in [(p, e, False) for p, e in parts] + [(p, e, True) for p, e in value.factors]:
+            sign = self.sign(part)
+            if sign:
+                one = Quotient(self, part) * sign
+            elif power % 2 == 0:
+                one, power = Quotient(self, self.reduce(part**2)), power // 2
+            else:
+                one = self._root(part**2)
+            result = result * (one**-power if invert else one**power)
+        return result
+
+    def _root(self, square: Poly) -> Quotient:
+        """A generator for the square root of a polynomial; for p^2 it is the absolute value of p."""
+        if square not in self._roots:
+
+            def rule(label: str, unknown: Name, axis: int) -> Quotient:
+                return self.derivative(Quotient(self, square), unknown, axis) / (self._make(label) * 2)
+
+            self._roots[square] = self._atom(self.reduce(square), rule, positive=True)
+        return self._make(self._roots[square])
+
+    def sqrt(self, value: Quotient) -> Quotient:
+        """Square root of a value that is not negative: squares come out, the rest becomes one root."""
+        if value.is_zero:
+            return value
+        content, parts = self.factor(value.numerator)
+        outside, inside = self.constant(1), self.ring(1)
+        for part, power, invert in [(p, e, False) for p, e in parts] + [(p, e, True) for p, e in value.factors]:
+            whole, odd = divmod(power + (power % 2 if invert else 0), 2)
+            if whole:
+                outside = outside * self.absolute(Quotient(self, part)) ** (-whole if invert else whole)
+            if odd or (invert and power % 2):
+                inside = inside * part
+        root_content, content = _rational_root(content)
+        outside = outside * self.constant(root_content)
+        inside = self.reduce(inside * content)
+        if inside == 1:
+            return outside
+        return outside * self._independent_root(inside)
+
+    def _independent_root(self, inside: Poly) -> Quotient:
+        """Square root of a polynomial, written with known roots where a product of theirs with it is a square.
+
+        Keeps the roots independent, so that for instance sin(t) = 2 sin(t/2) cos(t/2) is seen.
+        """
+        known = [square for square in self._roots if square != inside]
+        for count in range(1, len(known) + 1) if inside not in self._roots else ():
+            for chosen in combinations(known, count):
+                product = self.reduce(prod(chosen, start=inside))
+                content, parts = self.factor(product)
+                outside, rest = _rational_root(content)
+                if rest == 1 and all(power % 2 == 0 for _, power in parts):
+                    root = self.constant(outside)
+                    for part, power in parts:
+                        root = root * self.absolute(Quotient(self, part)) ** (power // 2)
+                    for square in chosen:
+                        root = root / self._make(self._roots[square])
+                    return root
+        return self._root(inside)
+
+    def arccos(self, cosine: Quotient) -> Quotient:
+        for exact, halves in ((0, 1), (1, 0), (-1, 2)):
+            if (cosine - exact).is_zero:
+                return self.pi * self.constant(QQ(halves, 2))
+        for known, angle in self._angles:
+            if (known - cosine).is_zero:
+                return angle
+            if (known + cosine).is_zero:
+                return self.pi - angle
+
+        def rule(label: str, unknown: Name, axis: int) -> Quotient:
+            return -self.derivative(cosine, unknown, axis) / self.sqrt(1 - cosine * cosine)
+
+        angle = self._make(self._atom(None, rule, positive=True))
+        self._angles.append((cosine, angle))
+        return angle
+
+    @cached_property
+    def pi(self) -> Quotient:
+        return self._make(self._atom(None, lambda label, unknown, axis: self.constant(0), positive=True))
+
+    def circle(self, angle: Quotient) -> tuple[Quotient, Quotient]:
+        """Sine and cosine: of ``n arccos(c)/2 + m pi/2`` through c, of anything else as a new pair on the unit circle."""
+        split = self._split_angle(angle)
+        if split is not None:
+            n, m, known_cosine = split
+            sine, cosine = self.constant(0), self.constant(1)
+            if known_cosine is not None:
+                one: tuple[Quotient, Quotient]
+                if n % 2:
+                    one = self.sqrt((1 - known_cosine) / 2), self.sqrt((1 + known_cosine) / 2)
+                else:
+                    n, one = n // 2, (self.sqrt(1 - known_cosine * known_cosine), known_cosine)
+                step = (one[0] if n > 0 else -one[0]), one[1]
+                for _ in range(abs(n)):
+                    sine, cosine = sine * step[1] + cosine * step[0], cosine * step[1] - sine * step[0]
+            for _ in range(m % 4):
+                sine, cosine = cosine, -sine
+            return sine, cosine
+        for known, sine, cosine in self._circles:
+            if (known - angle).is_zero:
+                return sine, cosine
+
+        def sine_rule(label: str, unknown: Name, axis: int) -> Quotient:
+            return self._make(cosine_label) * self.derivative(angle, unknown, axis)
+
+        def cosine_rule(label: str, unknown: Name, axis: int) -> Quotient:
+            return -self._make(sine_label) * self.derivative(angle, unknown, axis)
+
+        cosine_label = self._atom(None, cosine_rule, positive=False)
+        sine_label = self._atom(1 - self._generator[cosine_label] ** 2, sine_rule, positive=False)
+        pair = self._make(sine_label), self._make(cosine_label)
+        self._circles.append((angle, *pair))
+        return pair
+
+    def _split_angle(self, angle: Quotient) -> tuple[int, int, Quotient | None] | None:
+        """``angle = n t/2 + m pi/2`` as (n, m, cos t), or None where it is not of this form."""
+        if angle.factors:
+            return None
+        n, m, cosine = 0, 0, None
+        of_pi = self.pi.numerator
+        for monomial, coefficient in angle.numerator.items():
+            twice = coefficient * 2
+            if twice.denominator != 1:
+                return None
+            term = self.ring.from_dict({monomial: QQ(1)})
+            if term == of_pi:
+                m = int(twice)
+                continue
+            match = [c for c, known in self._angles if known.numerator == term]
+            if not match or cosine is not None:
+                return None
+            n, cosine = int(twice), match[0]
+        return n, m, cosine
+
+    # -- trees ----------------------------------------------------------------------------------------------------
+
+    def symbol(self, name: Name) -> Value:
+        """Value of a symbol: through its definition, or as generators."""
+        if name not in self._values:
+            meaning = self.section.meaning(name)
+            if meaning is not None:
+                self._values[name] = self.value(meaning)
+            elif name.bold:
+                base = [self._make(f"{self._points[0].label}.{axis}") for axis in "xyz"]
+                if name == self._points[0]:
+                    self._values[name] = base
+                else:
+                    span = self._make(f"length({name.label})")
+                    self._values[name] = [b + span * a for b, a in zip(base, self._direction[name], strict=True)]
+            else:
+                self._values[name] = self._make(str(name))
+        return self._values[name]
+
+    def value(self, expr: Expr, blocks: Callable[[Expr], Value] | None = None) -> Value:
+        """Value of a tree; ``blocks`` gives the values of forces, energies and derivatives.
+
+        Raises
+        ------
+        UnsupportedError
+            Where the tree holds what this reading does not decide.
+        ZeroDivisionError
+            Where a denominator is identically zero.
+        """
+        op, args = expr.op, expr.args
+        if op in {"force", "energy", "derivative"}:
+            if blocks is None:
+                raise UnsupportedError("a force or a derivative inside a definition")
+            return blocks(expr)
+        if op == "symbol":
+            return self.symbol(expr.name)
+        values = [self.value(arg, blocks) for arg in args]
+        match op:
+            case "number":
+                return self.constant(expr.value)
+            case "pi":
+                return self.pi
+            case "identity":
+                return [[self.constant(int(i == j)) for j in range(3)] for i in range(3)]
+            case "add":
+                return _reduce(values, _plus)
+            case "neg":
+                return _map(values[0], lambda v: -v)
+            case "mul":
+                kinds = [self._rank(arg, value) for arg, value in zip(args, values, strict=True)]
+                return _product(values, kinds)
+            case "frac":
+                inverse = values[1].inverse()
+                return _map(values[0], lambda v: v * inverse)
+            case "pow":
+                assert isinstance(expr.value, int)
+                return values[0] ** expr.value
+            case "transpose":
+                matrix = isinstance(values[0], list) and isinstance(values[0][0], list)
+                return [list(column) for column in zip(*values[0], strict=True)] if matrix else values[0]
+            case "norm":
+                if not isinstance(values[0], list):
+                    return self.absolute(values[0])
+                return self.sqrt(_reduce([v * v for v in values[0]], _plus))
+            case "abs":
+                return self.absolute(values[0])
+            case "sqrt":
+                return self.sqrt(values[0])
+            case "cross":
+                (a, b, c), (x, y, z) = values
+                return [b * z - c * y, c * x - a * z, a * y - b * x]
+            case "dot":
+                if isinstance(values[0], list) and isinstance(values[1], list):
+                    return _reduce([v * w for v, w in zip(*values, strict=True)], _plus)
+                return _product(values, [self._rank(arg, v) for arg, v in zip(args, values, strict=True)])
+            case "call":
+                if expr.value == "arccos":
+                    return self.arccos(values[0])
+                sine, cosine = self.circle(values[0])
+                return {"sin": lambda: sine, "cos": lambda: cosine, "tan": lambda: sine / cosine}[str(expr.value)]()
+        raise AssertionError(f"no such operation: {op}")
+
+    def _rank(self, expr: Expr, value: Value) -> str:
+        if not isinstance(value, list):
+            return "scalar"
+        return "matrix" if isinstance(value[0], list) else self.section.type_of(expr).value
+
+    # -- derivatives ----------------------------------------------------------------------------------------------
+
+    def derivative(self, value: Quotient, unknown: Name, axis: int = 0) -> Quotient:
+        """Exact partial derivative by an unknown, or by one coordinate of a point."""
+        result = self._poly_derivative(value.numerator, unknown, axis)
+        if value.factors:
+            result = result * Quotient(self, self.ring(1), value.factors)
+        for factor, power in value.factors:
+            result = result - value * self._poly_derivative(factor, unknown, axis) * power / Quotient(self, factor)
+        return result
+
+    def _poly_derivative(self, poly: Poly, unknown: Name, axis: int) -> Quotient:
+        total = self.constant(0)
+        used = [i for i in range(self.ring.ngens) if any(monomial[i] for monomial in poly)]
+        for i in used:
+            inner = self._generator_derivative(self.ring.symbols[i].name, unknown, axis)
+            if inner.numerator:
+                total = total + Quotient(self, self.reduce(poly.diff(self.ring.gens[i]))) * inner
+        return total
+
+    def _generator_derivative(self, label: str, unknown: Name, axis: int) -> Quotient:
+        key = (label, unknown, axis)
+        if key not in self._derivatives:
+            self._derivatives[key] = self._find_derivative(label, unknown, axis)
+        return self._derivatives[key]
+
+    def _find_derivative(self, label: str, unknown: Name, axis: int) -> Quotient:
+        if label in self._rules:
+            return self._rules[label](label, unknown, axis)
+        if not unknown.bold:
+            return self.constant(int(label == str(unknown)))
+        base = self._points[0]
+        for i, component in enumerate("xyz"):
+            if label == f"{base.label}.{component}":
+                return self.constant(int(unknown == base and i == axis))
+        for name in self._points[1:]:
+            if unknown not in (name, base):
+                continue
+            sign = 1 if unknown == name else -1
+            direction = self._direction[name]
+            if label == f"length({name.label})":
+                return direction[axis] * sign
+            for i, component in enumerate("xyz"):
+                if label == f"{name.label}.{component}":
+                    turned = int(i == axis) - direction[i] * direction[axis]
+                    return turned * sign / self._make(f"length({name.label})")
+        return self.constant(0)
+
+    def gradient(self, value: Value, unknown: Name) -> Value:
+        """Derivative of a scalar or a vector by an unknown: a scalar, a list of 3, or rows of 3."""
+        if isinstance(value, list):
+            return [self.gradient(v, unknown) for v in value]
+        if not unknown.bold:
+            return self.derivative(value, unknown)
+        return [self.derivative(value, unknown, axis) for axis in range(3)]
+
+
+def _rational_root(value: Any) -> tuple[Any, Any]:
+    """A positive rational as (root of its square part, rest)."""
+    from sympy import factorint
+
+    outside, inside = QQ(1), QQ(1)
+    for prime, power in [*factorint(value.numerator).items(), *((p, -e) for p, e in factorint(value.denominator).items())]:
+        outside *= QQ(prime) ** (power // 2)
+        inside *= QQ(prime) ** (power % 2)
+    return outside, inside
+
+
+def _map(value: Value, change: Callable[[Quotient], Quotient]) -> Value:
+    return [_map(v, change) for v in value] if isinstance(value, list) else change(value)
+
+
+def _plus(left: Value, right: Value) -> Value:
+    if isinstance(left, list):
+        return [_plus(a, b) for a, b in zip(left, right, strict=True)]
+    return left + right
+
+
+def _reduce(values: list[Value], combine: Callable[[Value, Value], Value]) -> Value:
+    total = values[0]
+    for value in values[1:]:
+        total = combine(total, value)
+    return total
+
+
+def _product(values: list[Value], kinds: list[str]) -> Value:
+    """Ordered product, each factor a scalar, vector (column), covector (row) or matrix."""
+    left, kind = values[0], kinds[0]
+    for right, other in zip(values[1:], kinds[1:], strict=True):
+        if kind == "scalar":
+            left, kind = _map(right, lambda v, s=left: s * v), other  # type: ignore[misc]
+        elif other == "scalar":
+            left = _map(left, lambda v, s=right: v * s)  # type: ignore[misc]
+        elif (kind, other) == ("vector", "covector"):
+            left, kind = [[a * b for b in right] for a in left], "matrix"
+        elif (kind, other) == ("covector", "vector"):
+            left, kind = _reduce([a * b for a, b in zip(left, right, strict=True)], _plus), "scalar"
+        elif (kind, other) == ("covector", "matrix"):
+            left = [_reduce([left[k] * right[k][j] for k in range(3)], _plus) for j in range(3)]
+        elif (kind, other) == ("matrix", "vector"):
+            left, kind = [_reduce([row[k] * right[k] for k in range(3)], _plus) for row in left], "vector"
+        else:
+            left = [[_reduce([row[k] * right[k][j] for k in range(3)], _plus) for j in range(3)] for row in left]
+    return left

@@ -1,0 +1,425 @@
+"""A verdict on every claim of a document.
+
+PROVED       the normal form of the difference is zero, and the second reading agrees at several exact states.
+REFUTED      at an exact rational state the two sides differ, certified by balls that do not meet; or the sides have
+             different shapes, or a symbol that nothing defines.
+UNDECIDED    neither; the reason is given.
+INCONSISTENT the two readings contradict each other: a defect of this tool, never of the document.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from fractions import Fraction
+from functools import cached_property
+from itertools import islice
+from typing import Any
+
+import flint
+
+from yarnverify.symbolic.declare import Declarations, Energy, Quantity
+from yarnverify.symbolic.document import (
+    Claim,
+    Definition,
+    Document,
+    Section,
+    instantiate,
+    read_document,
+    same_shape,
+)
+from yarnverify.symbolic.forward import Balls, Evaluation, Rationals, StateMaker, UndefinedError, entries
+from yarnverify.symbolic.latex import latex, name_latex
+from yarnverify.symbolic.normal import Field, Quotient, UnsupportedError, Value
+from yarnverify.symbolic.reader import Source
+from yarnverify.symbolic.tree import ZERO, Expr, Name, Type, is_zero
+
+EXACT_STATES = 3  # the second reading's; each is a proof of difference, or one more agreement
+_BALL_BITS = (128, 512, 2048)
+
+
+class Verdict(StrEnum):
+    PROVED = "proved"
+    REFUTED = "refuted"
+    UNDECIDED = "undecided"
+    INCONSISTENT = "inconsistent"
+
+
+@dataclass(frozen=True)
+class Witness:
+    """A state at which two sides differ, and their enclosed values there."""
+
+    state: dict[Name, Any]
+    left: tuple[Any, ...]
+    right: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was found of one claim."""
+
+    verdict: Verdict
+    reason: str = ""
+    witness: Witness | None = None
+    undefined: tuple[Name, ...] = ()
+
+
+class Court:
+    """Judges claims of one section; holds what the claims share: the field, the states, the true derivatives.
+
+    Parameters
+    ----------
+    section
+        Whose definitions and assumptions hold.
+    energy
+        The tree that forces and Jacobians are taken from.
+    also
+        Trees whose symbols may appear besides those of the section.
+    """
+
+    def __init__(self, section: Section, energy: Expr, also: Iterable[Expr] = ()) -> None:
+        self.section, self.energy = section, energy
+        trees = [energy, *also]
+        trees += [side for claim in section.claims for side in (claim.left, claim.right)]
+        trees += [side for a in section.assumptions for side in (a.left, a.right)]
+        names = {name for tree in trees for name in section.base_symbols(tree)} | set(section.unknowns)
+        names = {n for n in names if section.is_unknown(n) or n in section.parameters}
+        self.names = sorted(names, key=lambda n: (not n.bold, n.base, n.sub))
+        declared = section.declared
+        positive = {p.name for p in declared.parameters if p.positive} if declared else set(section.parameters)
+        self.positive = frozenset(positive)
+
+    # -- first reading
+
+    @cached_property
+    def field(self) -> Field:
+        return Field(self.section, self.names, self.positive)
+
+    @cached_property
+    def _energy_value(self) -> Value:
+        return self.field.value(self.energy)
+
+    @cached_property
+    def _blocks(self) -> dict[Expr, Value]:
+        return {}
+
+    def block(self, expr: Expr) -> Value:
+        """True normal form of a force, an energy or a derivative.
+
+        The sign between gradient and force is here for this reading.
+        """
+        if expr not in self._blocks:
+            if expr.op == "energy":
+                found = self._energy_value
+            elif expr.op == "force":
+                found = _negate(self.field.gradient(self._energy_value, expr.name))
+            else:
+                inner = expr.args[0]
+                of = self.block(inner) if inner.op in {"force", "energy"} else self.field.value(inner)
+                found = self.field.gradient(of, expr.name)
+            self._blocks[expr] = found
+        return self._blocks[expr]
+
+    def normal(self, expr: Expr) -> Value:
+        return self.field.value(expr, self.block)
+
+    def _equal_normal(self, left: Expr, right: Expr) -> bool:
+        a, b = _flat(self.normal(left)), _flat(self.normal(right))
+        if is_zero(right):
+            b = b * len(a)
+        if is_zero(left):
+            a = a * len(b)
+        return all((p - q).is_zero for p, q in zip(a, b, strict=True))
+
+    # -- second reading
+
+    @cached_property
+    def maker(self) -> StateMaker:
+        return StateMaker(self.section, self.names, self.positive)
+
+    @cached_property
+    def exact(self) -> list[Evaluation]:
+        """Evaluations at the first few states, over rationals."""
+        states = islice(self.maker.states(seed=1), EXACT_STATES)
+        return [Evaluation(self.section, state, Rationals(seed), self.energy) for seed, state in enumerate(states)]
+
+    @staticmethod
+    def sides(evaluation: Evaluation, left: Expr, right: Expr) -> list[tuple[Any, Any]]:
+        """Components of both sides at one state."""
+        a, b = entries(evaluation.value(left)), entries(evaluation.value(right))
+        if is_zero(right):
+            b = b * len(a)
+        if is_zero(left):
+            a = a * len(b)
+        return list(zip(a, b, strict=True))
+
+    def _differs(self, left: Expr, right: Expr) -> tuple[dict[Name, Any] | None, int]:
+        """A state at which the sides differ exactly, and the number of states at which both had a value."""
+        seen = 0
+        for evaluation in self.exact:
+            try:
+                pairs = self.sides(evaluation, left, right)
+            except UndefinedError:
+                continue
+            seen += 1
+            if any(a != b for a, b in pairs):
+                return dict(evaluation.state), seen
+        return None, seen
+
+    def certify(self, state: dict[Name, Any], left: Expr, right: Expr) -> Witness | None:
+        """The witness at a state, if balls of some precision show that the sides differ there."""
+        before = flint.ctx.prec
+        try:
+            for bits in _BALL_BITS:
+                flint.ctx.prec = bits
+                try:
+                    pairs = self.sides(Evaluation(self.section, state, Balls(), self.energy), left, right)
+                except UndefinedError:
+                    continue
+                if any(not a.overlaps(b) for a, b in pairs):
+                    return Witness(state, tuple(a for a, _ in pairs), tuple(b for _, b in pairs))
+        finally:
+            flint.ctx.prec = before
+        return None
+
+    # -- verdict
+
+    def judge(self, left: Expr, right: Expr) -> Finding:
+        """Whether two trees are equal."""
+        missing = tuple(dict.fromkeys([*self.section.undefined(left), *self.section.undefined(right)]))
+        if missing:
+            symbols = ", ".join(name_latex(name) for name in missing)
+            return Finding(Verdict.REFUTED, f"undefined symbol {symbols}", undefined=missing)
+        kinds = [self.section.type_of(side) for side in (left, right)]
+        if kinds[0] is not kinds[1] and not (is_zero(left) or is_zero(right)):
+            return Finding(Verdict.REFUTED, f"a {kinds[0].value} cannot equal a {kinds[1].value}")
+        try:
+            equal = self._equal_normal(left, right)
+        except UnsupportedError as error:
+            return Finding(Verdict.UNDECIDED, str(error))
+        except ZeroDivisionError:
+            return Finding(Verdict.UNDECIDED, "a denominator is zero everywhere")
+        state, seen = self._differs(left, right)
+        if equal and state is None and seen:
+            return Finding(Verdict.PROVED)
+        if not seen:
+            return Finding(Verdict.UNDECIDED, "no exact state was found at which both sides have a value")
+        if equal:
+            return Finding(Verdict.INCONSISTENT, "equal as normal forms, different at an exact state")
+        if state is None:
+            return Finding(Verdict.INCONSISTENT, "different as normal forms, equal at every exact state tried")
+        witness = self.certify(state, left, right)
+        if witness is None:
+            return Finding(Verdict.UNDECIDED, "the exact readings differ, but no ball arithmetic could tell the sides apart")
+        return Finding(Verdict.REFUTED, "", witness)
+
+
+def _negate(value: Value) -> Value:
+    return [_negate(v) for v in value] if isinstance(value, list) else -value
+
+
+def _flat(value: Value) -> list[Quotient]:
+    return [q for part in value for q in _flat(part)] if isinstance(value, list) else [value]
+
+
+# -- definitions and energies against what is declared ----------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A claim with its finding. ``kind`` is definition, energy, force, jacobian or identity."""
+
+    section: Section
+    claim: Claim
+    kind: str
+    finding: Finding
+    court: Court
+    because: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Completeness:
+    """Which non-zero forces and Jacobian blocks a section lists, and which it lacks."""
+
+    section: Section
+    court: Court
+    listed: tuple[str, ...]
+    zero: tuple[str, ...]
+    missing: tuple[Expr, ...]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Everything found of a document."""
+
+    document: Document
+    judged: tuple[Judged, ...]
+    given: tuple[tuple[Section, Definition, str], ...]
+    completeness: tuple[Completeness, ...]
+
+
+def declared_meaning(section: Section, symbol: Name, declarations: Declarations) -> Quantity | None:
+    """The declared quantity behind a symbol of a section."""
+    for found in declarations.quantities:
+        if found.symbol == symbol and found.section in ("", section.title):
+            return found
+    return None
+
+
+def read_with(source: Source, declarations: Declarations) -> Document:
+    """Read a document, each section tied to the declared energy of the same title."""
+    by_title: dict[str, Energy] = {energy.section.casefold(): energy for energy in declarations.energies}
+    return read_document(source, lambda section: by_title.get(section.title.casefold()) if section.title else None)
+
+
+def try_document(
+    document: Document, declarations: Declarations, advance: Callable[[str], None] = lambda what: None
+) -> Trial:
+    """Judge every claim of a document; ``advance`` is called as each is done.
+
+    Definitions and energies are compared with the declared ones where there are any, and are otherwise taken as given.
+    Forces and Jacobians are judged against the energy and the definitions that the document itself prints. Where one of
+    these has an undefined symbol, the declared one stands in for it, so that the other verdicts are not lost.
+    """
+    judged: list[Judged] = []
+    given: list[tuple[Section, Definition, str]] = []
+    completeness: list[Completeness] = []
+    definitions = [item for part in (document.shared, *document.sections) for item in _definition_claims(part, declarations)]
+    for section, definition, quantity in definitions:
+        if quantity is None:
+            given.append((section, definition, "definition"))
+            continue
+        claim, court = definition_claim(section, definition, quantity)
+        judged.append(Judged(section, claim, "definition", court.judge(claim.left, claim.right), court))
+        advance(definition.relation.equation)
+    wrong = [j for j in judged if j.finding.verdict is not Verdict.PROVED]
+    for part in (document.shared, *document.sections):
+        _stand_in(part, declarations, [j for j in wrong if j.finding.undefined and j.section is part])
+    for section in document.sections:
+        assert section.energy is not None
+        truth, blamed = section.energy.expression, [j for j in wrong if j.section in (section, document.shared)]
+        if section.declared is None:
+            given.append((section, section.energy, "energy"))
+        else:
+            claim = Claim("V", Expr("energy", value=section.energy.symbol), truth, section.energy.relation, 0)
+            court = Court(section, section.declared.expression, [truth])
+            finding = court.judge(claim.left, claim.right)
+            judged.append(Judged(section, claim, "energy", finding, court, _because(court, claim, finding, blamed, declarations)))
+            advance(section.energy.relation.equation)
+            if finding.undefined:
+                truth = section.declared.expression
+            elif finding.verdict is not Verdict.PROVED:
+                blamed = [*blamed, judged[-1]]
+        court = Court(section, truth)
+        for claim in section.claims:
+            finding = court.judge(claim.left, claim.right)
+            kind = _kind(claim)
+            judged.append(Judged(section, claim, kind, finding, court, _because(court, claim, finding, blamed, declarations)))
+            advance(claim.relation.equation)
+        completeness.append(_completeness(section, court))
+    order = {id(relation): i for i, relation in enumerate(document.relations)}
+    starts = {relation.offset: i for i, relation in enumerate(document.relations)}
+    judged.sort(key=lambda j: (order.get(id(j.claim.relation), starts.get(j.claim.relation.offset, 0)), j.claim.member))
+    return Trial(document, tuple(judged), tuple(given), tuple(completeness))
+
+
+def _definition_claims(
+    section: Section, declarations: Declarations
+) -> Iterator[tuple[Section, Definition, Quantity | None]]:
+    for definition in section.definitions.values():
+        yield section, definition, declared_meaning(section, definition.symbol, declarations)
+
+
+def definition_claim(section: Section, definition: Definition, quantity: Quantity) -> tuple[Claim, Court]:
+    """The claim that a printed definition is the declared one, for one value of its running index."""
+    declared, printed, symbol = quantity.expression, definition.expression, definition.symbol
+    if definition.index:
+        used = {name.sub for tree in (declared, printed) for name in section.base_symbols(tree)}
+        value = next(str(i) for i in range(1, 100) if str(i) not in used)
+        declared, printed = (instantiate(tree, definition.index, value) for tree in (declared, printed))
+        symbol = symbol.with_sub(value)
+    claim = Claim(str(definition.symbol), declared, printed, definition.relation, 0)
+    return claim, Court(section, ZERO, [declared, printed])
+
+
+def _stand_in(section: Section, declarations: Declarations, broken: Iterable[Judged]) -> None:
+    """Put the declared definitions in place of printed ones that have undefined symbols."""
+    for judged in broken:
+        for symbol, definition in list(section.definitions.items()):
+            quantity = declared_meaning(section, symbol, declarations)
+            if definition.relation is judged.claim.relation and quantity is not None:
+                section.definitions[symbol] = replace(definition, expression=quantity.expression)
+
+
+def as_declared(section: Section, declarations: Declarations) -> Section:
+    """A section with every declared definition in place of its printed one."""
+    copy = replace(section, definitions=dict(section.definitions), claims=[])
+    if section.shared is not None:
+        copy.shared = as_declared(section.shared, declarations)
+    for symbol, definition in section.definitions.items():
+        quantity = declared_meaning(section, symbol, declarations)
+        if quantity is not None:
+            copy.definitions[symbol] = replace(definition, expression=quantity.expression)
+    return copy
+
+
+def _because(
+    court: Court, claim: Claim, finding: Finding, blamed: list[Judged], declarations: Declarations
+) -> tuple[str, ...]:
+    """Equations whose mistake explains this one: with the declared definitions and energy the claim is true."""
+    if finding.verdict is not Verdict.REFUTED or finding.undefined or not blamed:
+        return ()
+    section = as_declared(court.section, declarations)
+    energy = section.declared.expression if section.declared is not None else court.energy
+    fair = Court(section, energy, [claim.left, claim.right])
+    if fair.judge(claim.left, claim.right).verdict is not Verdict.PROVED:
+        return ()
+    return tuple(dict.fromkeys(j.claim.relation.equation for j in blamed))
+
+
+def _kind(claim: Claim) -> str:
+    if not claim.block.startswith(("F_", "dF_")):
+        return "identity"
+    return "jacobian" if claim.block.startswith("dF_") else "force"
+
+
+def _completeness(section: Section, court: Court) -> Completeness:
+    """Compare the printed list of forces and Jacobians with what the energy has."""
+    listed = {claim.block for claim in section.claims}
+    for claim in section.claims:
+        listed |= {_name(side) for side in (claim.left, claim.right)}
+    missing: list[Expr] = []
+    zero: list[str] = []
+    found: list[str] = []
+    forces = [Expr("force", value=name) for name in section.unknowns]
+    jacobians = [Expr("derivative", (force,), name) for force in forces for name in section.unknowns]
+    for block in (*forces, *jacobians):
+        try:
+            nothing = all(q.is_zero for q in _flat(court.block(block)))
+        except (UnsupportedError, ZeroDivisionError):
+            continue
+        name = _name(block)
+        if nothing:
+            zero.append(name)
+        elif name in listed:
+            found.append(name)
+        else:
+            missing.append(block)
+    return Completeness(section, court, tuple(found), tuple(zero), tuple(missing))
+
+
+def _name(expr: Expr) -> str:
+    from yarnverify.symbolic.document import block_of
+
+    return block_of(expr)
+
+
+def hexadecimal(value: Fraction) -> str:
+    """A rational as a hexadecimal float; exact for the states drawn here."""
+    number = float(value)
+    assert Fraction(number) == value
+    return number.hex()
+
+
+__all__ = ["Court", "Finding", "Judged", "Trial", "Verdict", "Witness", "latex", "same_shape", "try_document", "Type"]
