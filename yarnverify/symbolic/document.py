@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from yarnverify.symbolic.declare import Assumption, Energy, assumptions
 from yarnverify.symbolic.latex import latex, name_latex
 from yarnverify.symbolic.reader import Heading, Relation, Source, read
-from yarnverify.symbolic.tree import Expr, Name, ShapeError, Type, is_zero, rebuild, type_of
+from yarnverify.symbolic.tree import Expr, Name, ShapeError, Type, rebuild, type_of
 
 _INDEX = re.compile(r"(?:\d+|[a-z]|[a-z][+-]\d+)\Z")
 
@@ -335,10 +335,3 @@ def _check_shapes(document: Document, groups: list[tuple[Section, list[Relation]
         energy = section.energy
         if energy is not None and section.type_of(energy.expression) not in (Type.SCALAR, Type.UNKNOWN):
             document.source.fail(energy.expression.span[0], "an energy is a scalar")
-
-
-def same_shape(section: Section, claim: Claim) -> tuple[Type, Type, bool]:
-    """Shapes of both sides of a claim, and whether they may be equal; the printed 0 fits every shape."""
-    left, right = section.type_of(claim.left), section.type_of(claim.right)
-    fits = left is right or Type.UNKNOWN in (left, right) or is_zero(claim.left) or is_zero(claim.right)
-    return left, right, fits

@@ -29,14 +29,11 @@ from sympy.polys.orderings import lex
 from sympy.polys.rings import PolyElement, ring
 
 from yarnverify.symbolic.document import Section
-from yarnverify.symbolic.tree import Expr, Name
+from yarnverify.symbolic.reading import Reading, UnsupportedError, Value
+from yarnverify.symbolic.tree import Name
 
 Poly = PolyElement
 _SPARE = 12  # generators kept free for square roots and angles that are met on the way
-
-
-class UnsupportedError(Exception):
-    """A formula that this reading cannot decide; the reason is for the user."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,10 +113,7 @@ class Quotient:
         return not self.numerator
 
 
-Value = Any  # a Quotient, a list of 3, or a list of 3 lists of 3, as the shape has it
-
-
-class Field:
+class Field(Reading):
     """The quotients of one section: generators for its symbols, values of its trees, and their derivatives.
 
     Parameters
@@ -133,7 +127,7 @@ class Field:
     """
 
     def __init__(self, section: Section, symbols: Iterable[Name], positive: Iterable[Name] = ()) -> None:
-        self.section = section
+        super().__init__(section)
         names = sorted(set(symbols), key=lambda n: (not n.bold, n.base, n.sub))
         self._points = [n for n in names if n.bold]
         self._scalars = [n for n in names if not n.bold]
@@ -155,7 +149,6 @@ class Field:
         self._factored: dict[Poly, tuple[Any, tuple[tuple[Poly, int], ...]]] = {}
         self._angles: list[tuple[Quotient, Quotient]] = []  # (cosine, angle)
         self._circles: list[tuple[Quotient, Quotient, Quotient]] = []  # (angle, sine, cosine)
-        self._values: dict[Name, Value] = {}
         self._derivatives: dict[tuple[str, Name, int], Quotient] = {}
         self._direction = {name: [self._make(f"{name.label}.{axis}") for axis in "xyz"] for name in self._points[1:]}
         for name in self._points[1:]:
@@ -403,92 +396,14 @@ class Field:
             n, cosine = int(twice), match[0]
         return n, m, cosine
 
-    # -- trees ----------------------------------------------------------------------------------------------------
-
-    def symbol(self, name: Name) -> Value:
-        """Value of a symbol: through its definition, or as generators."""
-        if name not in self._values:
-            meaning = self.section.meaning(name)
-            if meaning is not None:
-                self._values[name] = self.value(meaning)
-            elif name.bold:
-                base = [self._make(f"{self._points[0].label}.{axis}") for axis in "xyz"]
-                if name == self._points[0]:
-                    self._values[name] = base
-                else:
-                    span = self._make(f"length({name.label})")
-                    self._values[name] = [b + span * a for b, a in zip(base, self._direction[name], strict=True)]
-            else:
-                self._values[name] = self._make(str(name))
-        return self._values[name]
-
-    def value(self, expr: Expr, blocks: Callable[[Expr], Value] | None = None) -> Value:
-        """Value of a tree; ``blocks`` gives the values of forces, energies and derivatives.
-
-        Raises
-        ------
-        UnsupportedError
-            Where the tree holds what this reading does not decide.
-        ZeroDivisionError
-            Where a denominator is identically zero.
-        """
-        op, args = expr.op, expr.args
-        if op in {"force", "energy", "derivative"}:
-            if blocks is None:
-                raise UnsupportedError("a force or a derivative inside a definition")
-            return blocks(expr)
-        if op == "symbol":
-            return self.symbol(expr.name)
-        values = [self.value(arg, blocks) for arg in args]
-        match op:
-            case "number":
-                return self.constant(expr.value)
-            case "pi":
-                return self.pi
-            case "identity":
-                return [[self.constant(int(i == j)) for j in range(3)] for i in range(3)]
-            case "add":
-                return _reduce(values, _plus)
-            case "neg":
-                return _map(values[0], lambda v: -v)
-            case "mul":
-                kinds = [self._rank(arg, value) for arg, value in zip(args, values, strict=True)]
-                return _product(values, kinds)
-            case "frac":
-                inverse = values[1].inverse()
-                return _map(values[0], lambda v: v * inverse)
-            case "pow":
-                assert isinstance(expr.value, int)
-                return values[0] ** expr.value
-            case "transpose":
-                matrix = isinstance(values[0], list) and isinstance(values[0][0], list)
-                return [list(column) for column in zip(*values[0], strict=True)] if matrix else values[0]
-            case "norm":
-                if not isinstance(values[0], list):
-                    return self.absolute(values[0])
-                return self.sqrt(_reduce([v * v for v in values[0]], _plus))
-            case "abs":
-                return self.absolute(values[0])
-            case "sqrt":
-                return self.sqrt(values[0])
-            case "cross":
-                (a, b, c), (x, y, z) = values
-                return [b * z - c * y, c * x - a * z, a * y - b * x]
-            case "dot":
-                if isinstance(values[0], list) and isinstance(values[1], list):
-                    return _reduce([v * w for v, w in zip(*values, strict=True)], _plus)
-                return _product(values, [self._rank(arg, v) for arg, v in zip(args, values, strict=True)])
-            case "call":
-                if expr.value == "arccos":
-                    return self.arccos(values[0])
-                sine, cosine = self.circle(values[0])
-                return {"sin": lambda: sine, "cos": lambda: cosine, "tan": lambda: sine / cosine}[str(expr.value)]()
-        raise AssertionError(f"no such operation: {op}")
-
-    def _rank(self, expr: Expr, value: Value) -> str:
-        if not isinstance(value, list):
-            return "scalar"
-        return "matrix" if isinstance(value[0], list) else self.section.type_of(expr).value
+    def leaf(self, name: Name) -> Value:
+        if not name.bold:
+            return self._make(str(name))
+        base = [self._make(f"{self._points[0].label}.{axis}") for axis in "xyz"]
+        if name == self._points[0]:
+            return base
+        span = self._make(f"length({name.label})")
+        return [b + span * a for b, a in zip(base, self._direction[name], strict=True)]
 
     # -- derivatives ----------------------------------------------------------------------------------------------
 
@@ -556,41 +471,3 @@ def _rational_root(value: Any) -> tuple[Any, Any]:
         outside *= QQ(prime) ** (power // 2)
         inside *= QQ(prime) ** (power % 2)
     return outside, inside
-
-
-def _map(value: Value, change: Callable[[Quotient], Quotient]) -> Value:
-    return [_map(v, change) for v in value] if isinstance(value, list) else change(value)
-
-
-def _plus(left: Value, right: Value) -> Value:
-    if isinstance(left, list):
-        return [_plus(a, b) for a, b in zip(left, right, strict=True)]
-    return left + right
-
-
-def _reduce(values: list[Value], combine: Callable[[Value, Value], Value]) -> Value:
-    total = values[0]
-    for value in values[1:]:
-        total = combine(total, value)
-    return total
-
-
-def _product(values: list[Value], kinds: list[str]) -> Value:
-    """Ordered product, each factor a scalar, vector (column), covector (row) or matrix."""
-    left, kind = values[0], kinds[0]
-    for right, other in zip(values[1:], kinds[1:], strict=True):
-        if kind == "scalar":
-            left, kind = _map(right, lambda v, s=left: s * v), other  # type: ignore[misc]
-        elif other == "scalar":
-            left = _map(left, lambda v, s=right: v * s)  # type: ignore[misc]
-        elif (kind, other) == ("vector", "covector"):
-            left, kind = [[a * b for b in right] for a in left], "matrix"
-        elif (kind, other) == ("covector", "vector"):
-            left, kind = _reduce([a * b for a, b in zip(left, right, strict=True)], _plus), "scalar"
-        elif (kind, other) == ("covector", "matrix"):
-            left = [_reduce([left[k] * right[k][j] for k in range(3)], _plus) for j in range(3)]
-        elif (kind, other) == ("matrix", "vector"):
-            left, kind = [_reduce([row[k] * right[k] for k in range(3)], _plus) for row in left], "vector"
-        else:
-            left = [[_reduce([row[k] * right[k][j] for k in range(3)], _plus) for j in range(3)] for row in left]
-    return left

@@ -25,15 +25,15 @@ from yarnverify.symbolic.document import (
     Definition,
     Document,
     Section,
+    block_of,
     instantiate,
     read_document,
-    same_shape,
 )
 from yarnverify.symbolic.forward import Balls, Evaluation, Rationals, StateMaker, UndefinedError, entries
-from yarnverify.symbolic.latex import latex, name_latex
+from yarnverify.symbolic.latex import name_latex
 from yarnverify.symbolic.normal import Field, Quotient, UnsupportedError, Value
 from yarnverify.symbolic.reader import Source
-from yarnverify.symbolic.tree import ZERO, Expr, Name, Type, is_zero
+from yarnverify.symbolic.tree import ZERO, Expr, Name, is_zero
 
 EXACT_STATES = 3  # the second reading's; each is a proof of difference, or one more agreement
 _BALL_BITS = (128, 512, 2048)
@@ -90,6 +90,13 @@ class Court:
         positive = {p.name for p in declared.parameters if p.positive} if declared else set(section.parameters)
         self.positive = frozenset(positive)
 
+    def reaching(self, trees: Iterable[Expr]) -> Court:
+        """This court, or a larger one if the trees hold symbols that it does not."""
+        trees = list(trees)
+        names = {name for tree in trees for name in self.section.base_symbols(tree)}
+        known = {n for n in names if self.section.is_unknown(n) or n in self.section.parameters}
+        return self if known <= set(self.names) else Court(self.section, self.energy, trees)
+
     # -- first reading
 
     @cached_property
@@ -140,8 +147,9 @@ class Court:
 
     @cached_property
     def exact(self) -> list[Evaluation]:
-        """Evaluations at the first few states, over rationals."""
-        states = islice(self.maker.states(seed=1), EXACT_STATES)
+        """Evaluations over rationals at the states with the smallest numbers among many."""
+        many = islice(self.maker.states(seed=1), 16 * EXACT_STATES)
+        states = sorted(many, key=_spread)[:EXACT_STATES]
         return [Evaluation(self.section, state, Rationals(seed), self.energy) for seed, state in enumerate(states)]
 
     @staticmethod
@@ -213,6 +221,11 @@ class Court:
         if witness is None:
             return Finding(Verdict.UNDECIDED, "the exact readings differ, but no ball arithmetic could tell the sides apart")
         return Finding(Verdict.REFUTED, "", witness)
+
+
+def _spread(state: dict[Name, Any]) -> Fraction:
+    """Sum of squared coordinates: small states are pleasant to read and to type in."""
+    return sum((part * part for value in state.values() for part in (value if isinstance(value, tuple) else (value,))), Fraction(0))
 
 
 def _negate(value: Value) -> Value:
@@ -388,7 +401,7 @@ def _completeness(section: Section, court: Court) -> Completeness:
     """Compare the printed list of forces and Jacobians with what the energy has."""
     listed = {claim.block for claim in section.claims}
     for claim in section.claims:
-        listed |= {_name(side) for side in (claim.left, claim.right)}
+        listed |= {block_of(side) for side in (claim.left, claim.right)}
     missing: list[Expr] = []
     zero: list[str] = []
     found: list[str] = []
@@ -399,7 +412,7 @@ def _completeness(section: Section, court: Court) -> Completeness:
             nothing = all(q.is_zero for q in _flat(court.block(block)))
         except (UnsupportedError, ZeroDivisionError):
             continue
-        name = _name(block)
+        name = block_of(block)
         if nothing:
             zero.append(name)
         elif name in listed:
@@ -409,17 +422,8 @@ def _completeness(section: Section, court: Court) -> Completeness:
     return Completeness(section, court, tuple(found), tuple(zero), tuple(missing))
 
 
-def _name(expr: Expr) -> str:
-    from yarnverify.symbolic.document import block_of
-
-    return block_of(expr)
-
-
 def hexadecimal(value: Fraction) -> str:
     """A rational as a hexadecimal float; exact for the states drawn here."""
     number = float(value)
     assert Fraction(number) == value
     return number.hex()
-
-
-__all__ = ["Court", "Finding", "Judged", "Trial", "Verdict", "Witness", "latex", "same_shape", "try_document", "Type"]

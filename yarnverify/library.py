@@ -1,0 +1,161 @@
+"""Where documents and declarations lie, and which declarations a document is judged by.
+
+Reads files and text only, so that a verdict that is already known costs next to nothing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+MAIN_DOCUMENT = "cirio2014.md"
+_DISPLAY = re.compile(r"\$\$(.*?)\$\$", re.DOTALL)
+_NUMBER = re.compile(r"(\\tag\{[^}]*\}|\(\d+[a-z]?\))\s*$|\\quad|\s+")
+_DECLARES = re.compile(r"""document\s*=\s*["']([^"']+)["']""")
+
+
+class ErrataError(Exception):
+    """``errata.toml`` cannot be used."""
+
+
+@dataclass(frozen=True)
+class Shelf:
+    """A folder of derivations, as far as it concerns one document.
+
+    ``document`` is the name that its declarations give the document; ``folder`` is None where nothing is declared.
+    """
+
+    folder: Path | None
+    document: str
+    how: str
+
+
+@dataclass(frozen=True)
+class Erratum:
+    """A refuted equation that is known and accepted: its printed number, the change that mends it, and the reason."""
+
+    equation: str
+    change: str
+    reason: str
+
+
+def derivations() -> Path:
+    """The folder of derivations that comes with the package, in a checkout or installed."""
+    package = Path(__file__).parent
+    installed = package / "derivations"
+    return installed if installed.is_dir() else package.parent / "derivations"
+
+
+def _displays(text: str) -> set[str]:
+    return {_NUMBER.sub("", _NUMBER.sub("", found)) for found in _DISPLAY.findall(text)}
+
+
+def shelf_for(document: Path, text: str, choice: str | None = None) -> Shelf:
+    """Which declarations a document is judged by.
+
+    Parameters
+    ----------
+    document, text
+        The document's path and contents.
+    choice
+        A folder of derivations, ``"none"``, or None to find out: the document's own folder if its declarations name the
+        document, else those that come with the package if the document is an edition of theirs (at least half of its
+        displays are displays of it), else none.
+    """
+    if choice == "none":
+        return Shelf(None, document.name, "by itself alone")
+    folders = [Path(choice)] if choice else [document.parent, derivations()]
+    for folder in folders:
+        names = _declared_documents(folder)
+        if document.name in names and (choice or folder.resolve() == document.resolve().parent):
+            return Shelf(folder, document.name, f"by the energies declared in {folder}")
+    mine = _displays(text)
+    for folder in folders[-1:]:
+        for name in sorted(_declared_documents(folder)):
+            other = folder / name
+            if not other.is_file():
+                continue
+            common = len(mine & _displays(other.read_text(encoding="utf-8")))
+            if choice or 2 * common >= len(mine) > 0:
+                return Shelf(folder, name, f"by the energies declared for {name}, with which it shares {common} displays")
+    return Shelf(None, document.name, "by itself alone: no declared energies belong to it")
+
+
+def _declared_documents(folder: Path) -> set[str]:
+    return {name for path in folder.glob("*.py") for name in _DECLARES.findall(path.read_text(encoding="utf-8"))}
+
+
+def errata(shelf: Shelf) -> tuple[Erratum, ...]:
+    """The accepted errata of a document.
+
+    Raises
+    ------
+    ErrataError
+        Where the file is not TOML, or an entry lacks its equation, change or reason.
+    """
+    if shelf.folder is None:
+        return ()
+    path = shelf.folder / "errata.toml"
+    if not path.is_file():
+        return ()
+    try:
+        entries = tomllib.loads(path.read_text(encoding="utf-8")).get("erratum", [])
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ErrataError(f"{path}: {error}") from None
+    found = []
+    for number, entry in enumerate(entries, 1):
+        for key in ("document", "equation", "change", "reason"):
+            if not isinstance(entry.get(key), str) or not entry[key].strip():
+                raise ErrataError(f"{path}: erratum {number} needs a text for {key!r}")
+        if entry["document"] == shelf.document:
+            found.append(Erratum(entry["equation"], entry["change"], entry["reason"]))
+    return tuple(found)
+
+
+# -- results that are already known -----------------------------------------------------------------------------------
+
+
+def fingerprint(parts: Iterable[bytes | Path]) -> str:
+    """Hash of contents: of bytes, of files, and of all that decides a verdict in this package."""
+    import importlib.metadata
+
+    digest = hashlib.sha256()
+    own = sorted((Path(__file__).parent / "symbolic").glob("*"))
+    for part in [*parts, *(path for path in own if path.suffix in {".py", ".lark"})]:
+        data = part.read_bytes() if isinstance(part, Path) else part
+        digest.update(len(data).to_bytes(8, "big") + data)
+    for name in ("sympy", "python-flint", "lark"):
+        digest.update(importlib.metadata.version(name).encode())
+    return digest.hexdigest()
+
+
+def _cache() -> Path:
+    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(base) / "yarnverify"
+
+
+def recall(key: str) -> Any | None:
+    """A result stored under a fingerprint, or None."""
+    try:
+        return json.loads((_cache() / f"{key}.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def remember(key: str, record: Any) -> None:
+    """Store a result; where the cache cannot be written, the next run works it out again."""
+    path = _cache() / f"{key}.json"
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        draft = path.with_suffix(f".{os.getpid()}.tmp")
+        draft.write_text(json.dumps(record), encoding="utf-8")
+        draft.replace(path)
+    except OSError:
+        return

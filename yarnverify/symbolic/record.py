@@ -1,0 +1,253 @@
+"""What was found of a document, as plain JSON data: the only thing that tables and pages are made from."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import flint
+import numpy as np
+
+from yarnverify.library import Shelf
+from yarnverify.symbolic.declare import Declarations, load_declarations
+from yarnverify.symbolic.document import Relation, Section, block_of, definition_index
+from yarnverify.symbolic.forward import Balls, Evaluation, Floats, UndefinedError, entries
+from yarnverify.symbolic.latex import latex, name_latex
+from yarnverify.symbolic.prove import Completeness, Judged, Trial, Verdict, read_with, try_document
+from yarnverify.symbolic.reader import Source
+from yarnverify.symbolic.repair import Repair, Workshop, chain_latex, describe
+from yarnverify.symbolic.tree import Expr, Name
+
+SCHEMA = 1
+_ASIDE = Fraction(1, 2**20)  # how far from rest a formula is evaluated that is 0/0 at rest
+_REST_BITS = 256
+
+
+def prove_source(
+    source: Source, shelf: Shelf, advance: Callable[[str, int], None] = lambda what, total: None
+) -> dict[str, Any]:
+    """Judge a document and describe what was found.
+
+    Parameters
+    ----------
+    source
+        The document's text.
+    shelf
+        Which declarations it is judged by.
+    advance
+        Called with a label and the total number of steps as each step is done.
+    """
+    declarations = load_declarations(shelf.folder) if shelf.folder else Declarations()
+    declarations = Declarations(
+        tuple(e for e in declarations.energies if e.document == shelf.document),
+        tuple(q for q in declarations.quantities if q.document == shelf.document),
+    )
+    document = read_with(source, declarations)
+    total = sum(len(section.claims) + 1 for section in document.sections) + len(document.shared.definitions)
+    trial = try_document(document, declarations, lambda equation: advance(f"equation ({equation})", total))
+    return describe_trial(trial, shelf)
+
+
+def describe_trial(trial: Trial, shelf: Shelf) -> dict[str, Any]:
+    repairs: dict[int, Repair | None] = {}
+    claims = [_claim(judged, trial, repairs) for judged in trial.judged]
+    given = [
+        {"equation": d.relation.equation, "block": block_of(d.relation.members[0]), "kind": kind, "section": s.title,
+         "line": trial.document.source.place(d.relation.offset)[0], "printed": chain_latex(d.relation.members[:2])}
+        for s, d, kind in trial.given
+    ]  # fmt: skip
+    tally = Counter(claim["verdict"] for claim in claims)
+    return {
+        "schema": SCHEMA,
+        "document": Path(trial.document.source.name).name,
+        "judged": shelf.how if shelf.folder is None else f"by the energies declared for {shelf.document}",
+        "equations": list(trial.document.equations),
+        "tally": {verdict.value: tally.get(verdict.value, 0) for verdict in Verdict},
+        "claims": claims,
+        "given": given,
+        "completeness": [_completeness(found) for found in trial.completeness],
+    }
+
+
+def _claim(judged: Judged, trial: Trial, repairs: dict[int, Repair | None]) -> dict[str, Any]:
+    finding, claim = judged.finding, judged.claim
+    line, column = trial.document.source.place(claim.relation.offset)
+    repair = None
+    if finding.verdict is Verdict.REFUTED and not judged.because:
+        if id(claim.relation) not in repairs:
+            repairs[id(claim.relation)] = _repair(judged)
+        repair = repairs[id(claim.relation)]
+    refuted = finding.verdict is Verdict.REFUTED
+    return {
+        "equation": claim.relation.equation,
+        "block": claim.block,
+        "section": judged.section.title,
+        "kind": judged.kind,
+        "verdict": finding.verdict.value,
+        "reason": _reason(judged),
+        "because": list(judged.because),
+        "line": line,
+        "column": column,
+        "printed": chain_latex(claim.relation.members),
+        "correction": chain_latex(repair.members) if repair else _derived(judged) if refuted else None,
+        "change": describe(repair) if repair else None,
+        "witness": _witness(judged),
+        "effect": _effect(judged) if refuted and not finding.undefined else None,
+    }
+
+
+def _reason(judged: Judged) -> str:
+    finding = judged.finding
+    if judged.because:
+        return "follows from equation " + ", ".join(f"({number})" for number in judged.because)
+    if finding.reason:
+        return finding.reason
+    if finding.verdict is Verdict.REFUTED:
+        return "differs from the declared one" if judged.kind in ("definition", "energy") else "differs from the true value"
+    return ""
+
+
+def _repair(judged: Judged) -> Repair | None:
+    members = judged.claim.relation.members
+    if judged.kind == "definition":
+        index, value = definition_index(judged.section, judged.claim)
+        declared = judged.claim.left
+
+        def definition_sides(trees: tuple[Expr, ...]) -> list[tuple[Expr, Expr]]:
+            from yarnverify.symbolic.document import instantiate
+
+            return [(declared, instantiate(trees[1], index, value) if index else trees[1])]
+
+        return Workshop(judged.court, members, definition_sides).find()
+    if judged.kind == "energy":
+        declared_energy = judged.court.energy
+        return Workshop(judged.court, members, lambda trees: [(declared_energy, trees[1])]).find()
+    return Workshop(judged.court, members, lambda trees: [(left, trees[-1]) for left in trees[:-1]]).find()
+
+
+def _derived(judged: Judged) -> str | None:
+    return None
+
+
+# -- witnesses --------------------------------------------------------------------------------------------------------
+
+
+def _digits(value: Any) -> str:
+    return str(value.str(17, radius=False))
+
+
+def _witness(judged: Judged) -> dict[str, Any] | None:
+    witness = judged.finding.witness
+    if witness is None:
+        return None
+    point: dict[str, Any] = {}
+    hexadecimal: dict[str, Any] = {}
+    for name, value in witness.state.items():
+        parts = value if isinstance(value, tuple) else (value,)
+        texts, hexes = [str(part) for part in parts], [_hexadecimal(part) for part in parts]
+        point[name.label] = texts if name.bold else texts[0]
+        hexadecimal[name.label] = hexes if name.bold else hexes[0]
+    return {
+        "point": point,
+        "hex": hexadecimal,
+        "printed": [_digits(value) for value in witness.right],
+        "true": [_digits(value) for value in witness.left],
+        "residual": [_digits(r - t) for r, t in zip(witness.right, witness.left, strict=True)],
+    }
+
+
+def _hexadecimal(value: Fraction) -> str:
+    number = float(value)
+    if Fraction(number) != value:
+        raise AssertionError(f"{value} is not a double: states are drawn so that they are")
+    return number.hex()
+
+
+# -- what a mistake does in practice ----------------------------------------------------------------------------------
+
+
+def _rest(section: Section, names: list[Name], aside: Fraction) -> dict[Name, Any]:
+    """The declared rest state, with the second point moved aside across its segment."""
+    assert section.declared is not None
+    given, moved = section.declared.rest, False
+    state: dict[Name, Any] = {}
+    for name in names:
+        value = given.get(name.label, given.get(str(name)))
+        if name.bold:
+            point = [Fraction(part) for part in (value or (0, 0, 0))]
+            if value and name.sub != "0" and not moved:
+                point[2] += aside
+                moved = True
+            state[name] = tuple(point)
+        else:
+            state[name] = Fraction(value) if value is not None else Fraction(int(not section.is_unknown(name)))
+    return state
+
+
+def _effect(judged: Judged) -> str | None:
+    """Printed and true block at rest: eigenvalues of a 3x3 Jacobian, the values of anything else."""
+    section = judged.section
+    if section.declared is None or not section.declared.rest or judged.kind not in ("jacobian", "force"):
+        return None
+    claim = judged.claim
+    before = flint.ctx.prec
+    flint.ctx.prec = _REST_BITS
+    try:
+        for aside in (Fraction(0), _ASIDE):
+            state = _rest(section, judged.court.names, aside)
+            evaluation = Evaluation(section, state, Balls(), judged.court.energy)
+            try:
+                true, printed = evaluation.value(claim.left), evaluation.value(claim.right)
+            except UndefinedError:
+                continue
+            flip = -1 if claim.left.op == "neg" else 1
+            return _compare(claim.block, true, printed, flip, bool(aside))
+    finally:
+        flint.ctx.prec = before
+    return None
+
+
+def _compare(block: str, true: Any, printed: Any, flip: int, aside: bool) -> str:
+    where = "beside rest (moved 2^-20 m aside; at rest the formula is 0/0)" if aside else "at rest"
+    if getattr(true, "shape", None) == (3, 3) and getattr(printed, "shape", None) == (3, 3):
+        spectra = [_eigenvalues(value, flip) for value in (printed, true)]
+        text = f"eigenvalues {where}: printed {_list(spectra[0])}; true {_list(spectra[1])}"
+        force, _, unknown = block.partition("/")
+        unstable = [sum(value > 0 for value in spectrum) for spectrum in spectra]
+        if force.removeprefix("dF_") == unknown.removeprefix("d") and unstable[0] > unstable[1]:
+            text += f"; the printed stiffness is negative in {unstable[0]} directions, the true one in {unstable[1]}"
+        return text
+    values = [[flip * float(part) for part in entries(value)] for value in (printed, true)]
+    return f"{where}: printed {_list(values[0])}; true {_list(values[1])}"
+
+
+def _eigenvalues(block: Any, flip: int) -> list[float]:
+    matrix = np.array([[float(part) for part in row] for row in block]) * flip
+    values = np.linalg.eigvals(matrix)
+    size = float(np.max(np.abs(values), initial=0.0))
+    real = [float(v.real) if abs(v.real) > 1e-5 * size else 0.0 for v in values]
+    return sorted(real, reverse=True)
+
+
+def _list(values: list[float]) -> str:
+    return ", ".join(f"{value + 0.0:.4g}" for value in values)
+
+
+# -- completeness -----------------------------------------------------------------------------------------------------
+
+
+def _completeness(found: Completeness) -> dict[str, Any]:
+    return {
+        "section": found.section.title,
+        "verdict": "refuted" if found.missing else "proved",
+        "listed": list(found.listed),
+        "zero": list(found.zero),
+        "missing": [{"block": block_of(expr), "latex": latex(expr)} for expr in found.missing],
+    }
+
+
+__all__ = ["SCHEMA", "Floats", "Relation", "describe_trial", "name_latex", "prove_source", "replace"]

@@ -1,0 +1,269 @@
+"""The smallest single-term change that makes a refuted chain true.
+
+Every node of the printed chain is changed in every way of a fixed list, cheapest first: a symbol that nothing defines, a
+sign, a transpose, an index, a number, a power, a swapped function or symbol, a missing or an extra factor. A candidate must
+have the right shapes; one that is off in double precision at a random state is dropped; the first one that is PROVED, for
+every claim of its chain, is the repair.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from yarnverify.symbolic.document import Section, block_of
+from yarnverify.symbolic.forward import Evaluation, Floats, UndefinedError
+from yarnverify.symbolic.latex import latex, name_latex
+from yarnverify.symbolic.prove import Court, Verdict
+from yarnverify.symbolic.tree import ONE, PI, Expr, Name, ShapeError, Type, number, rebuild
+
+Sides = list[tuple[Expr, Expr]]
+_FLOAT_TOLERANCE = 1e-6  # sorts out candidates; whatever passes is proved exactly, or dropped
+
+
+@dataclass(frozen=True)
+class Repair:
+    """A change, in words and as the corrected chain."""
+
+    members: tuple[Expr, ...]
+    change: str
+    before: Expr
+    after: Expr
+
+
+@dataclass(frozen=True)
+class Candidate:
+    cost: int
+    change: str
+    before: Expr
+    after: Expr
+    members: tuple[Expr, ...]
+
+
+class Workshop:
+    """Tries changes of one chain.
+
+    Parameters
+    ----------
+    court
+        Judges the candidates.
+    members
+        The printed chain.
+    sides
+        The claims that a chain makes, as pairs that must be equal.
+    """
+
+    def __init__(self, court: Court, members: tuple[Expr, ...], sides: Callable[[tuple[Expr, ...]], Sides]) -> None:
+        self.court, self.members, self.sides = court, members, sides
+        self.section: Section = court.section
+
+    def find(self) -> Repair | None:
+        """The cheapest change that is proved, or None."""
+        seen: set[tuple[Expr, ...]] = {self.members}
+        for candidate in sorted(self._candidates(), key=lambda c: c.cost):
+            if candidate.members in seen:
+                continue
+            seen.add(candidate.members)
+            if self._hopeful(candidate) and self._proved(candidate):
+                return Repair(candidate.members, candidate.change, candidate.before, candidate.after)
+        return None
+
+    def _proved(self, candidate: Candidate) -> bool:
+        court = self.court.reaching(candidate.members)
+        return all(court.judge(*pair).verdict is Verdict.PROVED for pair in self.sides(candidate.members))
+
+    @cached_property
+    def _floats(self) -> list[Evaluation]:
+        states = [dict(evaluation.state) for evaluation in self.court.exact[:2]]
+        return [Evaluation(self.section, state, Floats(), self.court.energy) for state in states]
+
+    def _hopeful(self, candidate: Candidate) -> bool:
+        try:
+            for left, right in self.sides(candidate.members):
+                kinds = {self.section.type_of(left), self.section.type_of(right)}
+                if Type.UNKNOWN in kinds or (len(kinds) > 1 and right != number(0)):
+                    return False
+                if self.section.undefined(left) or self.section.undefined(right):
+                    return False
+                for evaluation in self._floats:
+                    if not self._close(self.court.sides(evaluation, left, right)):
+                        return False
+        except (ShapeError, UndefinedError):
+            return False
+        except KeyError:
+            return True  # a symbol that the states do not hold yet; the proof decides
+        return True
+
+    @staticmethod
+    def _close(pairs: list[tuple[Any, Any]]) -> bool:
+        size = max((max(abs(a), abs(b)) for a, b in pairs), default=0.0)
+        return all(abs(a - b) <= _FLOAT_TOLERANCE * size for a, b in pairs) if math.isfinite(size) else False
+
+    # -- the changes
+
+    def _candidates(self) -> Iterator[Candidate]:
+        yield from self._renamings()
+        for index, member in enumerate(self.members):
+            aside = int(bool(block_of(member)))  # what is printed of a block is doubted before the block's own name
+            for cost, change, before, after, tree in self._changes(member):
+                members = (*self.members[:index], tree, *self.members[index + 1 :])
+                yield Candidate(cost + aside, change, before, after, members)
+
+    def _renamings(self) -> Iterator[Candidate]:
+        """A symbol that nothing defines, read as one that the section knows, wherever the chain has it."""
+        unknown = dict.fromkeys(name for member in self.members for name in self.section.undefined(member))
+        for name in unknown:
+            for other in self._vocabulary:
+                before, after = (Expr("symbol", value=n) for n in (name, other))
+                members = tuple(rebuild(m, lambda node: after if node == before else None) for m in self.members)  # noqa: B023
+                yield Candidate(0, "undefined symbol", before, after, members)
+
+    def _changes(self, tree: Expr) -> Iterator[tuple[int, str, Expr, Expr, Expr]]:
+        for cost, change, before, after in self._here(tree):
+            yield cost, change, before, after, after
+        for index, arg in enumerate(tree.args):
+            for cost, change, before, after, new in self._changes(arg):
+                args = (*tree.args[:index], new, *tree.args[index + 1 :])
+                yield cost, change, before, after, replace(tree, args=args)
+
+    def _here(self, node: Expr) -> Iterator[tuple[int, str, Expr, Expr]]:
+        kind = self._type(node)
+        if kind is None:
+            return
+        yield from self._symbol_changes(node)
+        yield 1, "sign", node, _negated(node)
+        if kind in (Type.VECTOR, Type.COVECTOR):
+            after = node.args[0] if node.op == "transpose" else Expr("transpose", (node,))
+            yield 1, "transpose", node, after
+        if node.op == "number":
+            value = int(str(node.value))
+            for other in sorted({0, 1, 2, 3, 4, 6, 8, value - 1, value + 1} - {value}, key=lambda n: (abs(n - value), n)):
+                if other >= 0:
+                    yield 2, "number", node, number(other)
+        if node.op == "pow":
+            assert isinstance(node.value, int)
+            for other in (node.value - 1, node.value + 1, node.value + 2, node.value - 2, -node.value):
+                after = node.args[0] if other == 1 else replace(node, value=other) if other else ONE
+                yield 2, "power", node, after
+        elif kind is Type.SCALAR and node.op not in {"number", "neg", "force", "energy", "derivative", "add", "mul"}:
+            for exponent in (2, 3):
+                yield 2, "power", node, Expr("pow", (node,), exponent)
+        if node.op == "call":
+            for other_function in ("sin", "cos", "tan"):
+                if other_function != node.value and node.value != "arccos":
+                    yield 3, "function", node, replace(node, value=other_function)
+        if node.op == "mul":
+            for index in range(len(node.args)):
+                rest = (*node.args[:index], *node.args[index + 1 :])
+                if self._type(node.args[index]) in (Type.SCALAR, Type.MATRIX):
+                    yield 3, "extra factor", node, rest[0] if len(rest) == 1 else replace(node, args=rest)
+            for index in range(len(node.args) - 1):
+                swapped = (*node.args[:index], node.args[index + 1], node.args[index], *node.args[index + 2 :])
+                yield 3, "order of factors", node, replace(node, args=swapped)
+        if node.op == "frac":
+            if kind is Type.SCALAR:
+                yield 3, "fraction upside down", node, replace(node, args=node.args[::-1])
+            yield 3, "extra denominator", node, node.args[0]
+        if node.op == "add":
+            for index in range(len(node.args)):
+                rest = (*node.args[:index], *node.args[index + 1 :])
+                yield 4, "extra term", node, rest[0] if len(rest) == 1 else replace(node, args=rest)
+        yield from self._factors(node, kind)
+
+    def _symbol_changes(self, node: Expr) -> Iterator[tuple[int, str, Expr, Expr]]:
+        if node.op not in {"symbol", "force", "derivative"}:
+            return
+        name = node.name
+        if re.fullmatch(r"\d+", name.sub):
+            for sub in self._indices:
+                if sub != name.sub:
+                    yield 1, "index", node, replace(node, value=name.with_sub(sub))
+        if node.op == "symbol":
+            kind = self.section.lookup(name)
+            for other in self._vocabulary:
+                if other != name and kind in (Type.UNKNOWN, self.section.lookup(other)) and other.bold == name.bold:
+                    yield 3, "symbol", node, replace(node, value=other)
+
+    def _factors(self, node: Expr, kind: Type) -> Iterator[tuple[int, str, Expr, Expr]]:
+        """A factor too few: numbers, and the scalars and matrices that the section knows."""
+        for value in (2, 3, 4):
+            yield 2, "missing factor", node, _times(number(value), node)
+            yield 2, "missing factor", node, Expr("frac", (node, number(value)))
+        if node.op in {"number", "neg", "add", "force", "derivative", "energy"}:
+            return
+        for scalar in self._scalars:
+            yield 4, "missing factor", node, _times(scalar, node)
+            yield 4, "missing denominator", node, Expr("frac", (node, scalar))
+        for matrix in self._matrices if kind in (Type.VECTOR, Type.COVECTOR, Type.MATRIX) else ():
+            before = _after(node, matrix) if kind is Type.COVECTOR else _times(matrix, node)
+            yield 4, "missing factor", node, before
+            if kind is Type.MATRIX:
+                yield 4, "missing factor", node, _after(node, matrix)
+
+    def _type(self, node: Expr) -> Type | None:
+        try:
+            return self.section.type_of(node)
+        except ShapeError:
+            return None
+
+    @cached_property
+    def _indices(self) -> list[str]:
+        subs = {name.sub for name in self.court.names if re.fullmatch(r"\d+", name.sub)}
+        return sorted(subs, key=int)
+
+    @cached_property
+    def _vocabulary(self) -> list[Name]:
+        """Symbols that the section may speak of: parameters, unknowns, definitions at the section's indices."""
+        names = [*self.section.parameters, *self.court.names]
+        scopes = [self.section, self.section.shared] if self.section.shared else [self.section]
+        for scope in scopes:
+            for symbol, definition in scope.definitions.items():
+                names += [symbol.with_sub(i) for i in self._indices if i != "0"] if definition.index else [symbol]
+        return list(dict.fromkeys(names))
+
+    @cached_property
+    def _scalars(self) -> list[Expr]:
+        found = [Expr("symbol", value=name) for name in self._vocabulary if self.section.lookup(name) is Type.SCALAR]
+        angles = [s for s in found if self.section.meaning(s.name) is not None and _is_angle(self.section, s.name)]
+        found += [Expr("call", (angle,), function) for angle in angles for function in ("sin", "cos")]
+        return [*found, PI]
+
+    @cached_property
+    def _matrices(self) -> list[Expr]:
+        return [Expr("symbol", value=name) for name in self._vocabulary if self.section.lookup(name) is Type.MATRIX]
+
+
+def _is_angle(section: Section, name: Name) -> bool:
+    meaning = section.meaning(name)
+    return meaning is not None and any(node.op == "call" and node.value == "arccos" for node in meaning.walk())
+
+
+def _negated(node: Expr) -> Expr:
+    return node.args[0] if node.op == "neg" else Expr("neg", (node,))
+
+
+def _times(factor: Expr, node: Expr) -> Expr:
+    return replace(node, args=(factor, *node.args)) if node.op == "mul" else Expr("mul", (factor, node))
+
+
+def _after(node: Expr, factor: Expr) -> Expr:
+    return replace(node, args=(*node.args, factor)) if node.op == "mul" else Expr("mul", (node, factor))
+
+
+def describe(repair: Repair) -> str:
+    """The change in words, for instance ``sign of \\cos \\theta \\mathbf{P}_1``."""
+    before, after = latex(repair.before), latex(repair.after)
+    if repair.change == "sign":
+        body = repair.before.args[0] if repair.before.op == "neg" else repair.before
+        return f"sign of {latex(body)}"
+    if repair.change == "undefined symbol":
+        return f"{name_latex(repair.before.name)} should be {after}"
+    return f"{repair.change}: {before} should be {after}"
+
+
+def chain_latex(members: tuple[Expr, ...]) -> str:
+    return " = ".join(latex(member) for member in members)
