@@ -15,14 +15,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from yarnverify.errors import InputError
+
 MAIN_DOCUMENT = "cirio2014.md"
 _DISPLAY = re.compile(r"\$\$(.*?)\$\$", re.DOTALL)
 _NUMBER = re.compile(r"(\\tag\{[^}]*\}|\(\d+[a-z]?\))\s*$|\\quad|\s+")
 _DECLARES = re.compile(r"""document\s*=\s*["']([^"']+)["']""")
-
-
-class ErrataError(Exception):
-    """``errata.toml`` cannot be used."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,7 @@ def errata(shelf: Shelf) -> tuple[Erratum, ...]:
 
     Raises
     ------
-    ErrataError
+    InputError
         Where the file is not TOML, or an entry lacks its equation, change or reason.
     """
     if shelf.folder is None:
@@ -108,12 +106,12 @@ def errata(shelf: Shelf) -> tuple[Erratum, ...]:
     try:
         entries = tomllib.loads(path.read_text(encoding="utf-8")).get("erratum", [])
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ErrataError(f"{path}: {error}") from None
+        raise InputError(f"{path}: {error}") from None
     found = []
     for number, entry in enumerate(entries, 1):
         for key in ("document", "equation", "change", "reason"):
             if not isinstance(entry.get(key), str) or not entry[key].strip():
-                raise ErrataError(f"{path}: erratum {number} needs a text for {key!r}")
+                raise InputError(f"{path}: erratum {number} needs a text for {key!r}")
         if entry["document"] == shelf.document:
             found.append(Erratum(entry["equation"], entry["change"], entry["reason"]))
     return tuple(found)

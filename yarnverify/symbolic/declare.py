@@ -20,8 +20,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from yarnverify.symbolic.latex import GREEK
-from yarnverify.symbolic.reader import InputError, Source, parse
+from yarnverify.errors import InputError
+from yarnverify.source import Source
+from yarnverify.symbolic.reader import parse
 from yarnverify.symbolic.tree import PI, Expr, Name
 
 
@@ -258,14 +259,15 @@ def load_declarations(folder: Path) -> Declarations:
         except InputError:
             raise
         except SyntaxError as error:
-            raise InputError(str(path), error.lineno or 1, error.offset or 1, error.msg) from None
+            raise InputError(error.msg, (str(path), error.lineno or 1, error.offset or 1)) from None
         except Exception as error:
             lines = [frame.lineno for frame in inspect.getinnerframes(error.__traceback__) if frame.filename == str(path)]  # type: ignore[arg-type]
-            raise InputError(str(path), lines[-1] if lines else 1, 1, f"{type(error).__name__}: {error}") from None
+            place = (str(path), lines[-1] if lines else 1, 1)
+            raise InputError(f"{type(error).__name__}: {error}", place) from None
         for value in namespace.values():
             if isinstance(value, Energy):
                 if value.name in energies:
-                    raise InputError(str(path), 1, 1, f"energy {value.name!r} is declared twice")
+                    raise InputError(f"energy {value.name!r} is declared twice", (str(path), 1, 1))
                 energies[value.name] = value
             elif isinstance(value, Quantity):
                 quantities.append(value)
@@ -273,6 +275,6 @@ def load_declarations(folder: Path) -> Declarations:
 
 
 __all__ = [
-    "GREEK", "Assumption", "Declarations", "Energy", "Parameter", "Point", "Positive", "Quantity", "Real", "Sliding",
+    "Assumption", "Declarations", "Energy", "Parameter", "Point", "Positive", "Quantity", "Real", "Sliding",
     "angle", "assumptions", "deviation", "energy", "length", "load_declarations", "name_of", "quantity", "unit",
 ]  # fmt: skip

@@ -9,9 +9,10 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
+from yarnverify.source import Source
 from yarnverify.symbolic.declare import Assumption, Energy, assumptions
 from yarnverify.symbolic.latex import latex, name_latex
-from yarnverify.symbolic.reader import Heading, Relation, Source, read
+from yarnverify.symbolic.reader import Heading, Relation, read
 from yarnverify.symbolic.tree import Expr, Name, ShapeError, Type, rebuild, type_of
 
 _INDEX = re.compile(r"(?:\d+|[a-z]|[a-z][+-]\d+)\Z")
@@ -52,7 +53,7 @@ class Section:
     parameters: tuple[Name, ...] = ()
     unknowns: tuple[Name, ...] = ()
     declared: Energy | None = None
-    _families: set[tuple[str, bool]] = field(default_factory=lambda: {("x", True), ("u", False), ("v", False)})
+    families: set[tuple[str, bool]] = field(default_factory=lambda: {("x", True), ("u", False), ("v", False)})
 
     def definition(self, name: Name) -> Definition | None:
         """The definition behind a symbol: its own, or that of its family with a running index."""
@@ -77,7 +78,7 @@ class Section:
 
     def is_unknown(self, name: Name) -> bool:
         """Whether a symbol is a degree of freedom of some crossing: x_1, u_0, v_3, and families like them."""
-        return (name.base, name.bold) in self._families and bool(_INDEX.match(name.sub))
+        return (name.base, name.bold) in self.families and bool(_INDEX.match(name.sub))
 
     def undefined(self, expr: Expr) -> list[Name]:
         """Symbols under a tree that nothing defines, followed through definitions, in printed order."""
@@ -299,16 +300,16 @@ def _unknowns(section: Section, own: Iterable[Relation]) -> None:
     """Settle what the section's unknowns and parameters are: as declared, or as its printed energy has them."""
     assert section.energy is not None
     named = {node.name for r in own for m in r.members for node in m.walk() if node.op in {"force", "derivative"}}
-    section._families |= {(name.base, name.bold) for name in named if _INDEX.match(name.sub)}
+    section.families |= {(name.base, name.bold) for name in named if _INDEX.match(name.sub)}
     base = section.base_symbols(section.energy.expression)
     if section.declared is not None:
         section.parameters = tuple(parameter.name for parameter in section.declared.parameters)
         section.unknowns = section.declared.unknowns
-        section._families |= {(name.base, name.bold) for name in section.unknowns}
+        section.families |= {(name.base, name.bold) for name in section.unknowns}
         if not section.assumptions:
             section.assumptions = list(section.declared.domain)
         return
-    section._families |= {(n.base, n.bold) for n in base if n.bold and _INDEX.match(n.sub)}
+    section.families |= {(n.base, n.bold) for n in base if n.bold and _INDEX.match(n.sub)}
     section.parameters = tuple(name for name in base if not section.is_unknown(name))
     section.unknowns = tuple(sorted((n for n in base if section.is_unknown(n)), key=lambda n: (not n.bold, n.base, n.sub)))
 

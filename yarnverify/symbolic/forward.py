@@ -24,7 +24,7 @@ import numpy as np
 
 from yarnverify.symbolic.declare import Assumption
 from yarnverify.symbolic.document import Section
-from yarnverify.symbolic.tree import ZERO, Expr, Name
+from yarnverify.symbolic.tree import FORCE, ZERO, Expr, Name
 
 Number = Any  # flint.fmpq, Algebraic, flint.arb or float
 State = Mapping[Name, Any]  # a Fraction for a scalar, three for a point
@@ -350,21 +350,18 @@ class Evaluation:
         return [i for i, (name, _) in enumerate(self._unknowns) if name == unknown]
 
     def block(self, expr: Expr) -> Any:
-        """True value of a force, an energy or a derivative.
-
-        The sign between gradient and force is here for this reading.
-        """
+        """True value of a force, an energy or a derivative."""
         if expr.op == "energy":
             return self._energy_jet.value
         if expr.op == "force":
             columns = self.columns(expr.name)
             first = self._energy_jet.first
-            found = np.array([self._zero if first is None else -first[i] for i in columns], dtype=object)
+            found = np.array([self._zero if first is None else first[i] * FORCE for i in columns], dtype=object)
             return found.reshape(3, 1) if expr.name.bold else found[0]
         inner, wrt = expr.args[0], self.columns(expr.name)
         if inner.op == "force":
             rows, second = self.columns(inner.name), self._energy_jet.second
-            block = [[self._zero if second is None else -second[i, j] for j in wrt] for i in rows]
+            block = [[self._zero if second is None else second[i, j] * FORCE for j in wrt] for i in rows]
         else:
             jets = self._value(inner, jets=True)
             rows_of = [jets] if not isinstance(jets, np.ndarray) else list(jets.reshape(-1))

@@ -19,6 +19,7 @@ from typing import Any
 
 import flint
 
+from yarnverify.source import Source
 from yarnverify.symbolic.declare import Declarations, Energy, Quantity
 from yarnverify.symbolic.document import (
     Claim,
@@ -31,9 +32,9 @@ from yarnverify.symbolic.document import (
 )
 from yarnverify.symbolic.forward import Balls, Evaluation, Rationals, StateMaker, UndefinedError, entries
 from yarnverify.symbolic.latex import name_latex
-from yarnverify.symbolic.normal import Field, Quotient, UnsupportedError, Value
-from yarnverify.symbolic.reader import Source
-from yarnverify.symbolic.tree import ZERO, Expr, Name, is_zero
+from yarnverify.symbolic.normal import Field, Quotient
+from yarnverify.symbolic.reading import UnsupportedError, Value, map_value
+from yarnverify.symbolic.tree import FORCE, ZERO, Expr, Name, is_zero
 
 EXACT_STATES = 3  # the second reading's; each is a proof of difference, or one more agreement
 _BALL_BITS = (128, 512, 2048)
@@ -112,15 +113,12 @@ class Court:
         return {}
 
     def block(self, expr: Expr) -> Value:
-        """True normal form of a force, an energy or a derivative.
-
-        The sign between gradient and force is here for this reading.
-        """
+        """True normal form of a force, an energy or a derivative."""
         if expr not in self._blocks:
             if expr.op == "energy":
                 found = self._energy_value
             elif expr.op == "force":
-                found = _negate(self.field.gradient(self._energy_value, expr.name))
+                found = map_value(self.field.gradient(self._energy_value, expr.name), lambda q: q * FORCE)
             else:
                 inner = expr.args[0]
                 of = self.block(inner) if inner.op in {"force", "energy"} else self.field.value(inner)
@@ -228,10 +226,6 @@ def _spread(state: dict[Name, Any]) -> Fraction:
     return sum((part * part for value in state.values() for part in (value if isinstance(value, tuple) else (value,))), Fraction(0))
 
 
-def _negate(value: Value) -> Value:
-    return [_negate(v) for v in value] if isinstance(value, list) else -value
-
-
 def _flat(value: Value) -> list[Quotient]:
     return [q for part in value for q in _flat(part)] if isinstance(value, list) else [value]
 
@@ -241,7 +235,11 @@ def _flat(value: Value) -> list[Quotient]:
 
 @dataclass(frozen=True)
 class Judged:
-    """A claim with its finding. ``kind`` is definition, energy, force, jacobian or identity."""
+    """A claim with its finding. ``kind`` is definition, energy, force, jacobian or identity.
+
+    ``court`` is where it may be mended: with the declared definitions where printed ones are refuted. ``because`` names the equations whose mistake explains this one; ``index`` is the running index of a definition and the
+    value that it was judged at.
+    """
 
     section: Section
     claim: Claim
@@ -249,6 +247,7 @@ class Judged:
     finding: Finding
     court: Court
     because: tuple[str, ...] = ()
+    index: tuple[str, str] = ("", "")
 
 
 @dataclass(frozen=True)
@@ -303,8 +302,8 @@ def try_document(
         if quantity is None:
             given.append((section, definition, "definition"))
             continue
-        claim, court = definition_claim(section, definition, quantity)
-        judged.append(Judged(section, claim, "definition", court.judge(claim.left, claim.right), court))
+        claim, court, index = definition_claim(section, definition, quantity)
+        judged.append(Judged(section, claim, "definition", court.judge(claim.left, claim.right), court, index=index))
         advance(definition.relation.equation)
     wrong = [j for j in judged if j.finding.verdict is not Verdict.PROVED]
     for part in (document.shared, *document.sections):
@@ -318,17 +317,16 @@ def try_document(
             claim = Claim("V", Expr("energy", value=section.energy.symbol), truth, section.energy.relation, 0)
             court = Court(section, section.declared.expression, [truth])
             finding = court.judge(claim.left, claim.right)
-            judged.append(Judged(section, claim, "energy", finding, court, _because(court, claim, finding, blamed, declarations)))
+            judged.append(_Appeal(court, blamed, declarations).judged(claim, "energy", finding))
             advance(section.energy.relation.equation)
             if finding.undefined:
                 truth = section.declared.expression
             elif finding.verdict is not Verdict.PROVED:
                 blamed = [*blamed, judged[-1]]
         court = Court(section, truth)
+        appeal = _Appeal(court, blamed, declarations)
         for claim in section.claims:
-            finding = court.judge(claim.left, claim.right)
-            kind = _kind(claim)
-            judged.append(Judged(section, claim, kind, finding, court, _because(court, claim, finding, blamed, declarations)))
+            judged.append(appeal.judged(claim, _kind(claim), court.judge(claim.left, claim.right)))
             advance(claim.relation.equation)
         completeness.append(_completeness(section, court))
     order = {id(relation): i for i, relation in enumerate(document.relations)}
@@ -344,16 +342,17 @@ def _definition_claims(
         yield section, definition, declared_meaning(section, definition.symbol, declarations)
 
 
-def definition_claim(section: Section, definition: Definition, quantity: Quantity) -> tuple[Claim, Court]:
+def definition_claim(
+    section: Section, definition: Definition, quantity: Quantity
+) -> tuple[Claim, Court, tuple[str, str]]:
     """The claim that a printed definition is the declared one, for one value of its running index."""
-    declared, printed, symbol = quantity.expression, definition.expression, definition.symbol
+    declared, printed, value = quantity.expression, definition.expression, ""
     if definition.index:
         used = {name.sub for tree in (declared, printed) for name in section.base_symbols(tree)}
         value = next(str(i) for i in range(1, 100) if str(i) not in used)
         declared, printed = (instantiate(tree, definition.index, value) for tree in (declared, printed))
-        symbol = symbol.with_sub(value)
     claim = Claim(str(definition.symbol), declared, printed, definition.relation, 0)
-    return claim, Court(section, ZERO, [declared, printed])
+    return claim, Court(section, ZERO, [declared, printed]), (definition.index, value)
 
 
 def _stand_in(section: Section, declarations: Declarations, broken: Iterable[Judged]) -> None:
@@ -377,18 +376,27 @@ def as_declared(section: Section, declarations: Declarations) -> Section:
     return copy
 
 
-def _because(
-    court: Court, claim: Claim, finding: Finding, blamed: list[Judged], declarations: Declarations
-) -> tuple[str, ...]:
-    """Equations whose mistake explains this one: with the declared definitions and energy the claim is true."""
-    if finding.verdict is not Verdict.REFUTED or finding.undefined or not blamed:
-        return ()
-    section = as_declared(court.section, declarations)
-    energy = section.declared.expression if section.declared is not None else court.energy
-    fair = Court(section, energy, [claim.left, claim.right])
-    if fair.judge(claim.left, claim.right).verdict is not Verdict.PROVED:
-        return ()
-    return tuple(dict.fromkeys(j.claim.relation.equation for j in blamed))
+@dataclass
+class _Appeal:
+    """Judges refuted claims again, with the declared definitions and energy in place of refuted printed ones."""
+
+    court: Court
+    blamed: list[Judged]
+    declarations: Declarations
+
+    @cached_property
+    def fair(self) -> Court:
+        section = as_declared(self.court.section, self.declarations)
+        section.claims = self.court.section.claims
+        energy = section.declared.expression if section.declared is not None else self.court.energy
+        return Court(section, energy, [self.court.energy])
+
+    def judged(self, claim: Claim, kind: str, finding: Finding) -> Judged:
+        roots = tuple(dict.fromkeys(j.claim.relation.equation for j in self.blamed if not j.because))
+        if finding.verdict is not Verdict.REFUTED or finding.undefined or not roots:
+            return Judged(self.court.section, claim, kind, finding, self.court)
+        explained = self.fair.judge(claim.left, claim.right).verdict is Verdict.PROVED
+        return Judged(self.court.section, claim, kind, finding, self.fair, roots if explained else ())
 
 
 def _kind(claim: Claim) -> str:

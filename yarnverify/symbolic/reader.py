@@ -7,17 +7,18 @@ heading or at a numbered line of its own such as ``2 Bending``. Everything else 
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from lark import Lark, Token, Transformer, v_args
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 from lark.tree import Meta
 
+from yarnverify.errors import InputError
+from yarnverify.source import Source
 from yarnverify.symbolic.tree import IDENTITY, Expr, Name, number
 
 EQUATION_NUMBER = re.compile(
@@ -34,35 +35,6 @@ _PIECE = re.compile(
     r"|(?P<foreign>\\begin\s*\{\w+\*?\}|\\\[)",
     re.MULTILINE,
 )
-
-
-class InputError(Exception):
-    """Bad input, with the place it was found at: ``file:line:column: what is wrong``."""
-
-    def __init__(self, where: str, line: int, column: int, message: str) -> None:
-        super().__init__(f"{where}:{line}:{column}: {message}")
-
-
-@dataclass(frozen=True)
-class Source:
-    """A document's text, and where in it an offset lies."""
-
-    name: str
-    text: str
-
-    def place(self, offset: int) -> tuple[int, int]:
-        """Line and column, both from 1, of an offset."""
-        starts = _line_starts(self.text)
-        line = bisect_right(starts, offset)
-        return line, offset - starts[line - 1] + 1
-
-    def fail(self, offset: int, message: str) -> NoReturn:
-        raise InputError(self.name, *self.place(offset), message)
-
-
-@cache
-def _line_starts(text: str) -> tuple[int, ...]:
-    return (0, *(match.end() for match in re.finditer("\n", text)))
 
 
 @dataclass(frozen=True)
@@ -85,32 +57,6 @@ class Relation:
     equation: str
     offset: int
     inline: bool
-
-
-def load(path: Path) -> Source:
-    """Read a file as UTF-8 text.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, it is empty, or it is not text.
-    """
-    name = str(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(name, 1, 1, f"cannot read the document: {(error.strerror or str(error)).lower()}") from None
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        good = data[: error.start].decode("utf-8-sig")
-        Source(name, good).fail(len(good), f"not a text file: byte 0x{data[error.start]:02x} is not UTF-8")
-    source = Source(name, text.replace("\r\n", "\n").replace("\r", "\n"))
-    if "\0" in text:
-        source.fail(source.text.index("\0"), "not a text file: it holds a zero byte")
-    if not text.strip():
-        source.fail(0, "the document is empty")
-    return source
 
 
 def read(source: Source) -> Iterator[Heading | Relation]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -13,14 +12,15 @@ import flint
 import numpy as np
 
 from yarnverify.library import Shelf
+from yarnverify.source import Source
 from yarnverify.symbolic.declare import Declarations, load_declarations
-from yarnverify.symbolic.document import Relation, Section, block_of, definition_index
-from yarnverify.symbolic.forward import Balls, Evaluation, Floats, UndefinedError, entries
-from yarnverify.symbolic.latex import latex, name_latex
+from yarnverify.symbolic.derive import derive
+from yarnverify.symbolic.document import Section, block_of, instantiate
+from yarnverify.symbolic.forward import Balls, Evaluation, UndefinedError, entries
+from yarnverify.symbolic.latex import latex
 from yarnverify.symbolic.prove import Completeness, Judged, Trial, Verdict, read_with, try_document
-from yarnverify.symbolic.reader import Source
 from yarnverify.symbolic.repair import Repair, Workshop, chain_latex, describe
-from yarnverify.symbolic.tree import Expr, Name
+from yarnverify.symbolic.tree import FORCE, Expr, Name
 
 SCHEMA = 1
 _ASIDE = Fraction(1, 2**20)  # how far from rest a formula is evaluated that is 0/0 at rest
@@ -96,7 +96,7 @@ def _claim(judged: Judged, trial: Trial, repairs: dict[int, Repair | None]) -> d
         "correction": chain_latex(repair.members) if repair else _derived(judged) if refuted else None,
         "change": describe(repair) if repair else None,
         "witness": _witness(judged),
-        "effect": _effect(judged) if refuted and not finding.undefined else None,
+        "effect": _effect(judged) if refuted and not finding.undefined and not judged.because else None,
     }
 
 
@@ -112,24 +112,40 @@ def _reason(judged: Judged) -> str:
 
 
 def _repair(judged: Judged) -> Repair | None:
-    members = judged.claim.relation.members
+    members, declared = judged.claim.relation.members, judged.claim.left
     if judged.kind == "definition":
-        index, value = definition_index(judged.section, judged.claim)
-        declared = judged.claim.left
+        index, value = judged.index
 
-        def definition_sides(trees: tuple[Expr, ...]) -> list[tuple[Expr, Expr]]:
-            from yarnverify.symbolic.document import instantiate
-
+        def sides(trees: tuple[Expr, ...]) -> list[tuple[Expr, Expr]]:
             return [(declared, instantiate(trees[1], index, value) if index else trees[1])]
 
-        return Workshop(judged.court, members, definition_sides).find()
+        return Workshop(judged.court, members, sides).find()
     if judged.kind == "energy":
-        declared_energy = judged.court.energy
-        return Workshop(judged.court, members, lambda trees: [(declared_energy, trees[1])]).find()
+        return Workshop(judged.court, members, lambda trees: [(judged.court.energy, trees[1])]).find()
     return Workshop(judged.court, members, lambda trees: [(left, trees[-1]) for left in trees[:-1]]).find()
 
 
 def _derived(judged: Judged) -> str | None:
+    """What should stand there when no small change mends it: the declared or derived formula."""
+    claim, section = judged.claim, judged.section
+    if judged.kind == "definition":
+        return f"{latex(claim.relation.members[0])} = {latex(claim.left)}"
+    if judged.kind == "energy":
+        return f"{latex(claim.left)} = {latex(judged.court.energy)}"
+    block = claim.left.args[0] if claim.left.op == "neg" else claim.left
+    tree = _derived_block(section, judged.court.energy, block)
+    return f"{latex(block)} = {latex(tree)}" if tree is not None else None
+
+
+def _derived_block(section: Section, energy: Expr, block: Expr) -> Expr | None:
+    names = [node.name for node in block.walk() if node.op in ("force", "derivative")]
+    derivation = derive(energy, section, tuple(dict.fromkeys([*section.unknowns, *names])))
+    if derivation is None:
+        return None
+    if block.op == "force":
+        return derivation.gradient(block.name, FORCE)
+    if block.op == "derivative" and block.args[0].op == "force":
+        return derivation.hessian(block.args[0].name, block.name, FORCE)
     return None
 
 
@@ -149,8 +165,9 @@ def _witness(judged: Judged) -> dict[str, Any] | None:
     for name, value in witness.state.items():
         parts = value if isinstance(value, tuple) else (value,)
         texts, hexes = [str(part) for part in parts], [_hexadecimal(part) for part in parts]
-        point[name.label] = texts if name.bold else texts[0]
-        hexadecimal[name.label] = hexes if name.bold else hexes[0]
+        label = name.label if judged.section.is_unknown(name) else str(name)
+        point[label] = texts if name.bold else texts[0]
+        hexadecimal[label] = hexes if name.bold else hexes[0]
     return {
         "point": point,
         "hex": hexadecimal,
@@ -246,8 +263,12 @@ def _completeness(found: Completeness) -> dict[str, Any]:
         "verdict": "refuted" if found.missing else "proved",
         "listed": list(found.listed),
         "zero": list(found.zero),
-        "missing": [{"block": block_of(expr), "latex": latex(expr)} for expr in found.missing],
+        "missing": [
+            {"block": block_of(expr), "latex": latex(expr), "derived": _missing(found, expr)} for expr in found.missing
+        ],
     }
 
 
-__all__ = ["SCHEMA", "Floats", "Relation", "describe_trial", "name_latex", "prove_source", "replace"]
+def _missing(found: Completeness, expr: Expr) -> str | None:
+    tree = _derived_block(found.section, found.court.energy, expr)
+    return latex(tree) if tree is not None else None

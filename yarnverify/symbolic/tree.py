@@ -134,6 +134,8 @@ def symbol(base: str, sub: str = "", bold: bool = False) -> Expr:
     return Expr("symbol", value=Name(base, sub, bold))
 
 
+FORCE = -1  # a force is this times the gradient, in every reading
+
 PI = Expr("pi")
 IDENTITY = Expr("identity")
 ZERO = number(0)

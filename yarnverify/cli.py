@@ -1,0 +1,182 @@
+"""The command line: ``yarnverify prove | derive | generate | report``.
+
+Exit status: 0 all as expected; 1 a check failed, or an erratum is new or stale; 2 bad usage or input; 3 asked for but could
+not run. Heavy imports happen inside the commands, so that ``--help`` answers at once.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, Literal, NoReturn
+
+import cyclopts
+from cyclopts import App, Parameter
+
+from yarnverify import __version__
+
+app = App(
+    name="yarnverify",
+    version=__version__,
+    help="Proofs for printed yarn energies, forces and Jacobians, and NumPy kernels derived from them.",
+)
+
+Derivations = Annotated[
+    str | None,
+    Parameter(help="Folder of declared energies to judge by, or 'none'; found out from the document by default."),
+]
+
+
+def _stop(message: str, status: int = 2) -> NoReturn:
+    print(message, file=sys.stderr)
+    sys.exit(status)
+
+
+@contextmanager
+def progress(what: str) -> Iterator[Callable[[str, int], None]]:
+    """A progress bar on standard error, if that is a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda label, total: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[label]}"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=None, label="")
+        yield lambda label, total: bar.update(task, advance=1, total=total, label=label)
+
+
+def _record(document: Path | None, derivations: str | None, cache: bool) -> tuple[dict[str, Any], str]:
+    """The record of a document with its errata settled, and a line on how long it took."""
+    from yarnverify.verdicts import verdicts
+
+    with progress("proving") as advance:
+        return verdicts(document, derivations, cache, advance)
+
+
+@app.command
+def prove(
+    document: Path | None = None,
+    /,
+    *,
+    derivations: Derivations = None,
+    json_file: Annotated[Path | None, Parameter(name="--json", help="Write the record here; - for standard output.")] = None,
+    cache: Annotated[bool, Parameter(help="Use and keep results that are already known.")] = True,
+) -> None:
+    """A verdict on every printed equation.
+
+    Parameters
+    ----------
+    document
+        Markdown or text with numbered formulas; the paper's document by default.
+    """
+    from yarnverify.show import show_verdicts
+
+    record, took = _record(document, derivations, cache)
+    if json_file is not None and str(json_file) == "-":
+        print(json.dumps(record, indent=2, ensure_ascii=False))
+    else:
+        if json_file is not None:
+            _write(json_file, json.dumps(record, indent=2, ensure_ascii=False) + "\n")
+        show_verdicts(record, took)
+    if not record["as_expected"]:
+        sys.exit(1)
+
+
+@app.command
+def derive(
+    energy: str,
+    /,
+    *,
+    format: Literal["text", "latex", "markdown"] = "text",
+    derivations: Annotated[Path | None, Parameter(help="Folder of declared energies.")] = None,
+    json_file: Annotated[Path | None, Parameter(name="--json", help="Write the derivation as JSON; - for standard output.")] = None,
+) -> None:
+    """The derivation of an energy: measures, their derivatives, the chain rule, the result.
+
+    Parameters
+    ----------
+    energy
+        Name of a declared energy, such as bending.
+    """
+    from yarnverify.symbolic.explain import explain, explanation
+
+    record = explanation(energy, derivations)
+    if json_file is not None:
+        text = json.dumps(record, indent=2, ensure_ascii=False) + "\n"
+        if str(json_file) == "-":
+            sys.stdout.write(text)
+            return
+        _write(json_file, text)
+    print(explain(record, format))
+
+
+@app.command
+def generate(
+    *,
+    check: Annotated[bool, Parameter(negative="", help="Compare with the files instead of writing them.")] = False,
+    json_file: Annotated[Path | None, Parameter(name="--json", help="Write names and operation counts; - for standard output.")] = None,
+) -> None:
+    """The kernels, from the derivations."""
+    from yarnverify.generation import generate_kernels
+
+    with progress("generating") as advance:
+        outcome = generate_kernels(check, advance)
+    if json_file is not None:
+        text = json.dumps(outcome.record, indent=2) + "\n"
+        sys.stdout.write(text) if str(json_file) == "-" else _write(json_file, text)
+    for line in outcome.lines:
+        print(line, file=sys.stderr if str(json_file) == "-" else sys.stdout)
+    if outcome.differs:
+        sys.exit(1)
+
+
+@app.command
+def report(
+    *,
+    out: Annotated[Path, Parameter(help="Folder for the pages and the records behind them.")] = Path("reports"),
+    check: Annotated[bool, Parameter(negative="", help="Compare with the files instead of writing them.")] = False,
+    json_file: Annotated[Path | None, Parameter(name="--json", help="Write the tally; - for standard output.")] = None,
+) -> None:
+    """All of it, to reports/: verdicts, corrections, derivations and kernels, a page an energy."""
+    from yarnverify.report.build import build_report
+
+    with progress("reporting") as advance:
+        outcome = build_report(out, check, advance)
+    if json_file is not None:
+        text = json.dumps(outcome.record, indent=2) + "\n"
+        sys.stdout.write(text) if str(json_file) == "-" else _write(json_file, text)
+    for line in outcome.lines:
+        print(line, file=sys.stderr if str(json_file) == "-" else sys.stdout)
+    if outcome.differs:
+        sys.exit(1)
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        _stop(f"{path}: cannot write: {(error.strerror or str(error)).lower()}")
+
+
+def main() -> None:
+    """Run the command line; bad input is one line on standard error and exit status 2."""
+    from yarnverify.errors import InputError, NotRunError
+
+    try:
+        app(error_formatter=lambda error: f"yarnverify: {error}", exit_on_error=False, print_error=False)
+    except cyclopts.CycloptsError as error:
+        _stop(f"yarnverify: {' '.join(str(error).split())}")
+    except InputError as error:
+        _stop(str(error))
+    except NotRunError as error:
+        _stop(str(error), 3)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(0)
+    except KeyboardInterrupt:
+        _stop("interrupted", 130)

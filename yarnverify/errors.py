@@ -1,0 +1,14 @@
+"""Errors that a user can do something about; each is one line."""
+
+from __future__ import annotations
+
+
+class InputError(Exception):
+    """Bad input. With a place it reads ``file:line:column: what is wrong``."""
+
+    def __init__(self, message: str, place: tuple[str, int, int] | None = None) -> None:
+        super().__init__(f"{place[0]}:{place[1]}:{place[2]}: {message}" if place else message)
+
+
+class NotRunError(Exception):
+    """Something was asked for that could not run here."""

@@ -1,0 +1,85 @@
+"""The verdicts of a document, from the cache where they are known, settled against its errata."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from yarnverify.library import (
+    MAIN_DOCUMENT,
+    Erratum,
+    Shelf,
+    derivations,
+    errata,
+    fingerprint,
+    recall,
+    remember,
+    shelf_for,
+)
+from yarnverify.source import load
+
+
+def verdicts(
+    document: Path | None = None,
+    choice: str | None = None,
+    cache: bool = True,
+    advance: Callable[[str, int], None] = lambda label, total: None,
+) -> tuple[dict[str, Any], str]:
+    """The record of a document and a line on how long it took.
+
+    Parameters
+    ----------
+    document
+        Path of the document; the main one by default.
+    choice
+        Folder of derivations to judge by, ``"none"``, or None to find out.
+    cache
+        Whether results that are already known are used and kept.
+    advance
+        Called as each claim is judged.
+
+    Raises
+    ------
+    InputError
+        For a document, declarations or errata that cannot be read.
+    """
+    start = time.perf_counter()
+    path = document if document is not None else derivations() / MAIN_DOCUMENT
+    source = load(path)
+    shelf = shelf_for(path, source.text, choice)
+    parts: list[bytes | Path] = [source.name.encode(), source.text.encode(), shelf.document.encode(), shelf.how.encode()]
+    parts += sorted(shelf.folder.glob("*.py")) if shelf.folder else []
+    key = fingerprint(parts)
+    record = recall(key) if cache else None
+    known = record is not None
+    if record is None:
+        from yarnverify.symbolic.record import prove_source
+
+        record = prove_source(source, shelf, advance)
+        if cache:
+            remember(key, record)
+    settle(record, shelf, errata(shelf))
+    seconds = time.perf_counter() - start
+    return record, f"{'known from an earlier run' if known else 'derived and proved'} in {seconds:.2f} s"
+
+
+def settle(record: dict[str, Any], shelf: Shelf, accepted: tuple[Erratum, ...]) -> None:
+    """Mark what the errata accept; add what is new, what is stale, and whether all is as expected."""
+    used: set[Erratum] = set()
+    new: list[str] = []
+    for claim in record["claims"]:
+        claim["erratum"] = None
+        if claim["verdict"] == "proved":
+            continue
+        match = [e for e in accepted if e.equation == claim["equation"] and e.change == claim["change"]]
+        if claim["verdict"] == "refuted" and match:
+            claim["erratum"] = match[0].reason
+            used.update(match)
+        elif claim["equation"] not in new:
+            new.append(claim["equation"])
+    missing = [item["block"] for part in record["completeness"] for item in part["missing"]]
+    stale = [e.equation for e in accepted if e not in used]
+    record["errata"] = {"accepted": [e.equation for e in accepted if e in used], "new": new, "stale": stale}
+    record["as_expected"] = not (new or stale or missing)
