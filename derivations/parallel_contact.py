@@ -6,6 +6,7 @@ from yarnverify.symbolic.declare import Positive, Sliding, energy
     section="Parallel Contact",
     unit="J",
     domain=r"u_1 - u_0 < d",
+    elsewhere="zero",
     rest={"u0": 0, "u1": 1, "d": 1},
 )
 def parallel_contact(

@@ -18,7 +18,7 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, Literal, get_type_hints
 
 from yarnverify.errors import InputError
 from yarnverify.source import Source
@@ -105,6 +105,8 @@ class Energy:
         undefined, in the notation of the document.
     rest
         One state of least energy: a value for each unknown (3 for a point), and 1 for each parameter not named.
+    elsewhere
+        What holds outside the domain: ``error``, or ``zero`` for an energy that does not act there.
     """
 
     name: str
@@ -119,6 +121,7 @@ class Energy:
     removable: str = ""
     singular: str = ""
     rest: dict[str, Any] = field(default_factory=dict)
+    elsewhere: str = "error"
 
 
 @dataclass(frozen=True)
@@ -198,6 +201,7 @@ def energy(
     removable: str = "",
     singular: str = "",
     rest: dict[str, Any] | None = None,
+    elsewhere: Literal["error", "zero"] = "error",
 ) -> Callable[[Callable[..., Expr]], Energy]:
     """Declare an energy; see the module's example and ``Energy`` for what the options mean."""
 
@@ -213,7 +217,7 @@ def energy(
         return Energy(
             name, document, section, unit, inspect.getdoc(function) or "",
             tuple(node.name for node in unknowns.values()), tuple(parameters.values()),
-            function(**unknowns, **symbols), tuple(where), removable, singular, rest or {},
+            function(**unknowns, **symbols), tuple(where), removable, singular, rest or {}, elsewhere,
         )  # fmt: skip
 
     return declare

@@ -22,7 +22,7 @@ from typing import Any
 import sympy as sp
 
 from yarnverify.symbolic.declare import Energy, Quantity, angle, length, unit
-from yarnverify.symbolic.document import Definition, Section
+from yarnverify.symbolic.document import Definition, Section, block_of
 from yarnverify.symbolic.prove import Court, Finding
 from yarnverify.symbolic.reader import Relation
 from yarnverify.symbolic.tree import FORCE, IDENTITY, ONE, PI, ZERO, Expr, Name, number
@@ -326,7 +326,7 @@ def _product(factors: list[Expr]) -> Expr:
     return factors[0] if len(factors) == 1 else Expr("mul", tuple(factors))
 
 
-def _sum(terms: Iterable[tuple[Any, tuple[Expr, ...]]]) -> Expr:
+def sum_tree(terms: Iterable[tuple[Any, tuple[Expr, ...]]]) -> Expr:
     """``sum scalar * factors``; terms with the same factors are joined, and a scalar shared by all is taken out."""
     joined: dict[tuple[Expr, ...], Any] = {}
     for value, factors in terms:
@@ -360,20 +360,24 @@ class Derivation:
         """First derivatives of the law by its measures."""
         return {m: sp.diff(self.law, _scalar(m.symbol)) for m in self.measures}
 
+    def law_slope(self, *names: Name) -> Any:
+        """Derivative of the law by measures and sliding coordinates, as SymPy has it."""
+        return sp.factor_terms(sp.diff(self.law, *(_scalar(name) for name in names)))
+
     def _measure_slope(self, measure: Measure, unknown: Name) -> list[tuple[Any, tuple[Expr, ...]]]:
         return [(a.end(unknown) * value, factors) for a, value, factors in measure.slope if a.end(unknown)]
 
     def gradient(self, unknown: Name, scale: int = 1) -> Expr:
         """Gradient block: a vector for a point, a scalar for a sliding coordinate."""
         if not unknown.bold:
-            return _sum([(scale * sp.diff(self.law, _scalar(unknown)), ())])
+            return sum_tree([(scale * sp.diff(self.law, _scalar(unknown)), ())])
         if self._is_hub(unknown):
             return _minus_sum([Expr("force", value=other) for other in self._others(unknown)])
         terms = []
         for measure in self.measures:
             for value, factors in self._measure_slope(measure, unknown):
                 terms.append((scale * self.slopes[measure] * value, factors))
-        return _sum(terms)
+        return sum_tree(terms)
 
     def hessian(self, row: Name, column: Name, scale: int = 1) -> Expr:
         """Hessian block; rows belong to ``row``."""
@@ -382,7 +386,7 @@ class Derivation:
                 pairs = [(o, column) if unknown == row else (row, o) for o in self._others(unknown)]
                 return _minus_sum([Expr("derivative", (Expr("force", value=r),), c) for r, c in pairs])
         if not row.bold and not column.bold:
-            return _sum([(scale * sp.diff(self.law, _scalar(row), _scalar(column)), ())])
+            return sum_tree([(scale * sp.diff(self.law, _scalar(row), _scalar(column)), ())])
         if not (row.bold and column.bold):
             point, sliding = (row, column) if row.bold else (column, row)
             terms = []
@@ -390,7 +394,7 @@ class Derivation:
                 mixed = sp.diff(self.slopes[measure], _scalar(sliding))
                 for value, factors in self._measure_slope(measure, point):
                     terms.append((scale * mixed * value, factors if row.bold else _transposed(factors)))
-            return _sum(terms)
+            return sum_tree(terms)
         terms = []
         for measure in self.measures:
             for a in measure.segments:
@@ -403,7 +407,7 @@ class Derivation:
                 for value, left in self._measure_slope(measure, row):
                     for value2, right in self._measure_slope(other, column):
                         terms.append((scale * second * value * value2, (*left, *_transposed(right))))
-        return _sum(terms)
+        return sum_tree(terms)
 
     @cached_property
     def _segments(self) -> tuple[Segment, ...]:
@@ -418,15 +422,18 @@ class Derivation:
         return [name for name in self.unknowns if name.bold and name != hub]
 
     def check(self) -> dict[str, Finding]:
-        """Proof of every block against the exact derivatives of the energy."""
-        from yarnverify.symbolic.document import block_of
-
+        """Proof of the law and of every block against the energy and its exact derivatives."""
         court = Court(self.section, self.energy)
-        found = {}
+        found = {"V": court.judge(self.energy, self.law_tree)}
         for force, jacobian in self.blocks(FORCE):
             for block, tree in (force, *jacobian):
                 found[block_of(block)] = court.judge(block, tree)
         return found
+
+    @property
+    def law_tree(self) -> Expr:
+        """The energy in terms of its measures."""
+        return scalar_tree(self.law)
 
     def blocks(self, scale: int) -> Iterable[tuple[tuple[Expr, Expr], list[tuple[Expr, Expr]]]]:
         """For each unknown its gradient block and its Hessian blocks, each times ``scale``, as (name, tree)."""

@@ -49,6 +49,10 @@ class Reading(ABC):
 
     pi: Any
 
+    def hold(self, value: Any) -> Any:
+        """An intermediate scalar that is used more than once; a reading that writes programs gives it a name."""
+        return value
+
     def symbol(self, name: Name) -> Value:
         """Value of a symbol: through its definition, or as a leaf."""
         if name not in self._values:
@@ -86,14 +90,15 @@ class Reading(ABC):
             case "neg":
                 return map_value(values[0], lambda v: -v)
             case "mul":
-                kinds = [self._rank(arg, value) for arg, value in zip(args, values, strict=True)]
-                return _product(values, kinds)
+                return self._product(values, [self._rank(arg, value) for arg, value in zip(args, values, strict=True)])
             case "frac":
-                inverse = self.constant(1) / values[1]
+                if not isinstance(values[0], list):
+                    return values[0] / values[1]
+                inverse = self.hold(self.constant(1) / values[1])
                 return map_value(values[0], lambda v: v * inverse)
             case "pow":
                 assert isinstance(expr.value, int)
-                return values[0] ** expr.value
+                return self.hold(values[0]) ** expr.value
             case "transpose":
                 matrix = isinstance(values[0], list) and isinstance(values[0][0], list)
                 return [list(column) for column in zip(*values[0], strict=True)] if matrix else values[0]
@@ -111,13 +116,50 @@ class Reading(ABC):
             case "dot":
                 if isinstance(values[0], list) and isinstance(values[1], list):
                     return fold([v * w for v, w in zip(*values, strict=True)], plus)
-                return _product(values, [self._rank(arg, v) for arg, v in zip(args, values, strict=True)])
+                return self._product(values, [self._rank(arg, v) for arg, v in zip(args, values, strict=True)])
             case "call":
                 if expr.value == "arccos":
                     return self.arccos(values[0])
                 sine, cosine = self.circle(values[0])
                 return {"sin": lambda: sine, "cos": lambda: cosine, "tan": lambda: sine / cosine}[str(expr.value)]()
         raise AssertionError(f"no such operation: {op}")
+
+    def _product(self, values: list[Value], kinds: list[str]) -> Value:
+        """Ordered product: scalars are gathered, and what an outer product joins is worked out first on either side."""
+        scalars = [value for value, kind in zip(values, kinds, strict=True) if kind == "scalar"]
+        others = [(value, kind) for value, kind in zip(values, kinds, strict=True) if kind != "scalar"]
+        scale = fold(scalars, lambda a, b: a * b) if scalars else None
+        if not others:
+            return scale
+        value = self._chain(others)[0]
+        if scale is None:
+            return value
+        scale = self.hold(scale)
+        return map_value(value, lambda v: scale * v)
+
+    def _chain(self, factors: list[tuple[Value, str]]) -> tuple[Value, str]:
+        for i in range(len(factors) - 1):
+            if factors[i][1] == "vector" and factors[i + 1][1] == "covector":
+                (left, _), (right, kind) = self._chain(factors[: i + 1]), self._chain(factors[i + 1 :])
+                if kind == "scalar":
+                    return map_value(left, lambda v: v * right), "vector"
+                left, right = map_value(left, self.hold), map_value(right, self.hold)
+                return [[a * b for b in right] for a in left], "matrix"
+        (left, kind), *rest = factors
+        for right, other in rest:
+            if kind == "scalar":
+                scale = self.hold(left)
+                left, kind = map_value(right, lambda v, s=scale: s * v), other  # type: ignore[misc]
+            elif (kind, other) == ("covector", "vector"):
+                left, kind = fold([a * b for a, b in zip(left, right, strict=True)], plus), "scalar"
+            elif (kind, other) == ("covector", "matrix"):
+                left = [fold([left[k] * right[k][j] for k in range(3)], plus) for j in range(3)]
+            elif (kind, other) == ("matrix", "vector"):
+                left, kind = [fold([row[k] * right[k] for k in range(3)], plus) for row in left], "vector"
+            else:
+                left = [[fold([row[k] * right[k][j] for k in range(3)], plus) for j in range(3)] for row in left]
+            left = map_value(left, self.hold)
+        return left, kind
 
     def _rank(self, expr: Expr, value: Value) -> str:
         if not isinstance(value, list):
@@ -140,24 +182,3 @@ def fold(values: list[Value], combine: Callable[[Value, Value], Value]) -> Value
     for value in values[1:]:
         total = combine(total, value)
     return total
-
-
-def _product(values: list[Value], kinds: list[str]) -> Value:
-    """Ordered product, each factor a scalar, vector (column), covector (row) or matrix."""
-    left, kind = values[0], kinds[0]
-    for right, other in zip(values[1:], kinds[1:], strict=True):
-        if kind == "scalar":
-            left, kind = map_value(right, lambda v, s=left: s * v), other  # type: ignore[misc]
-        elif other == "scalar":
-            left = map_value(left, lambda v, s=right: v * s)  # type: ignore[misc]
-        elif (kind, other) == ("vector", "covector"):
-            left, kind = [[a * b for b in right] for a in left], "matrix"
-        elif (kind, other) == ("covector", "vector"):
-            left, kind = fold([a * b for a, b in zip(left, right, strict=True)], plus), "scalar"
-        elif (kind, other) == ("covector", "matrix"):
-            left = [fold([left[k] * right[k][j] for k in range(3)], plus) for j in range(3)]
-        elif (kind, other) == ("matrix", "vector"):
-            left, kind = [fold([row[k] * right[k] for k in range(3)], plus) for row in left], "vector"
-        else:
-            left = [[fold([row[k] * right[k][j] for k in range(3)], plus) for j in range(3)] for row in left]
-    return left

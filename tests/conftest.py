@@ -1,0 +1,40 @@
+"""What all tests share: the document, its declarations, and what was found of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import settings
+
+from yarnverify.library import MAIN_DOCUMENT, derivations, shelf_for
+from yarnverify.source import Source, load
+
+settings.register_profile("ci", derandomize=True, deadline=None, print_blob=True)
+settings.load_profile("ci")
+
+
+@pytest.fixture(scope="session")
+def folder() -> Path:
+    return derivations()
+
+
+@pytest.fixture(scope="session")
+def source(folder: Path) -> Source:
+    return load(folder / MAIN_DOCUMENT)
+
+
+@pytest.fixture(scope="session")
+def declarations(folder: Path) -> Any:
+    from yarnverify.symbolic.declare import load_declarations
+
+    return load_declarations(folder)
+
+
+@pytest.fixture(scope="session")
+def record(source: Source) -> dict[str, Any]:
+    """The record of the main document, worked out afresh."""
+    from yarnverify.symbolic.record import prove_source
+
+    return prove_source(source, shelf_for(Path(source.name), source.text))

@@ -1,0 +1,89 @@
+"""``yarnverify generate``: the kernels, from the derivations; files are written or compared, never edited."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from yarnverify.library import MAIN_DOCUMENT, derivations
+
+DEFAULT_VARIANT = "differentiated"
+
+
+@dataclass
+class Outcome:
+    """What a command that writes or compares files did."""
+
+    record: dict[str, Any] = field(default_factory=dict)
+    lines: list[str] = field(default_factory=list)
+    differs: bool = False
+
+
+def settle_files(folder: Path, texts: dict[str, str], check: bool, stale: list[str], again: str) -> Outcome:
+    """Write texts below a folder, or compare them with what is there and show the difference.
+
+    Parameters
+    ----------
+    folder, texts
+        Where, and what: relative path to contents.
+    check
+        Compare instead of writing.
+    stale
+        Generated files that are there and should not be.
+    again
+        The command that writes them.
+    """
+    from yarnverify.errors import NotRunError
+
+    outcome = Outcome()
+    for name, text in texts.items():
+        path = folder / name
+        old = path.read_bytes().decode("utf-8", "replace") if path.is_file() else None
+        if old == text:
+            continue
+        if check:
+            outcome.differs = True
+            if old is None:
+                outcome.lines.append(f"{name}: is missing")
+                continue
+            shown = difflib.unified_diff(old.splitlines(), text.splitlines(), f"{name} (file)", f"{name} (generated)", lineterm="")
+            outcome.lines += list(shown) or [f"{name}: line endings differ"]
+            continue
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(text.encode("utf-8"))
+        except OSError as error:
+            raise NotRunError(f"{path}: cannot write: {(error.strerror or str(error)).lower()}") from None
+        outcome.lines.append(f"{name}: written")
+    for name in stale:
+        outcome.differs |= check
+        if not check:
+            (folder / name).unlink()
+        outcome.lines.append(f"{name}: {'belongs to nothing' if check else 'removed: belonged to nothing'}")
+    if check and outcome.differs:
+        outcome.lines.append(f"Files differ from what the derivations give; to write them: {again}")
+    elif not outcome.lines:
+        outcome.lines.append(f"{len(texts)} files in {folder.name}/ are as generated.")
+    return outcome
+
+
+def generate_kernels(check: bool, advance: Callable[[str, int], None] = lambda label, total: None) -> Outcome:
+    """Generate every variant of every declared energy of the main document.
+
+    Raises
+    ------
+    InputError, NotRunError
+        For derivations that cannot be read or proved, and files that cannot be written.
+    """
+    from yarnverify.symbolic.modules import kernel_modules
+
+    folder = Path(__file__).parent / "kernels"
+    texts, record = kernel_modules(derivations(), MAIN_DOCUMENT, DEFAULT_VARIANT, advance)
+    kept = {"__init__.py", "runtime.py"}
+    there = {path.relative_to(folder).as_posix() for path in folder.rglob("*.py")}
+    outcome = settle_files(folder, texts, check, sorted(there - set(texts) - kept), "yarnverify generate")
+    outcome.record = record
+    return outcome

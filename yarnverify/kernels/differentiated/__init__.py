@@ -1,0 +1,1 @@
+"""Variant ``differentiated``: the derivative by SymPy, chain rule over the measures, common subexpressions shared. Generated."""

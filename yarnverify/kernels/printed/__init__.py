@@ -1,0 +1,1 @@
+"""Variant ``printed``: the document's own formulas, misprints included. Generated."""
