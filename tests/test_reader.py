@@ -266,13 +266,13 @@ BAD_TEXTS = [
     ("$$\\begin{aligned} a = b \\end{aligned} \\quad (7)$$", "1:3", r"unknown LaTeX command \\begin"),
     ("$$a = b \\\\ c = d \\quad (7)$$", "1:9", "unknown LaTeX command"),
     ("$$a &= b \\quad (7)$$", "1:5", "unexpected character '&'"),
-    ("$$a = \\quad (7)$$", "1:13", "ends where something must follow"),
+    ("$$a = \\quad (7)$$", "1:6", "ends where something must follow"),
     ("$$a = = b \\quad (7)$$", "1:7", "unexpected '='"),
     ("$$a \\neq b \\quad (7)$$", "1:5", r"unknown LaTeX command \\neq"),
     ("x\n\n$$a =\n  b + \\foo \\quad (7)$$", "4:7", r"unknown LaTeX command \\foo"),
-    ("$$F_{u_0}, F_{u_1} = 0 \\quad (7)$$", "1:3", ""),
-    ("$$F_{u_0} \\quad (7)$$", "1:", ""),
-    ("see $[a, b$", "1:", "unexpected"),
+    ("$$F_{u_0}, F_{u_1} = 0 \\quad (7)$$", "1:3", "states nothing"),
+    ("$$F_{u_0} \\quad (7)$$", "1:3", "states nothing"),
+    ("see $[a, b$", "1:11", "ends where something must follow"),
 ]
 
 

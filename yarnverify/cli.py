@@ -143,7 +143,7 @@ def report(
     json_file: Annotated[Path | None, Parameter(name="--json", help="Write the tally; - for standard output.")] = None,
 ) -> None:
     """All of it, to reports/: verdicts, corrections, derivations and kernels, a page an energy."""
-    from yarnverify.report.build import build_report
+    from yarnverify.reporting import build_report
 
     with progress("reporting") as advance:
         outcome = build_report(out, check, advance)

@@ -15,4 +15,14 @@ from yarnverify.kernels.differentiated.bending import (
     packed,
 )
 
-__all__ = ["DOFS", "KERNEL", "PARAMETERS", "VARIANT", "energy", "evaluate", "gradient", "hessian", "packed"]
+__all__ = [
+    "DOFS",
+    "KERNEL",
+    "PARAMETERS",
+    "VARIANT",
+    "energy",
+    "evaluate",
+    "gradient",
+    "hessian",
+    "packed",
+]

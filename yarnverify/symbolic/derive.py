@@ -282,10 +282,12 @@ def scalar_tree(value: Any) -> Expr:
     if value.is_Add:
         terms = [scalar_tree(term) for term in sorted(value.args, key=_term_key)]
         return Expr("add", tuple(terms))
-    if value.is_Mul or (value.is_Pow and value.exp.is_Rational and value.exp < 0):
-        above, below = value.as_numer_denom() if value.is_Mul else (sp.S.One, 1 / value)
+    if value.is_Mul or value.is_Pow:
+        value = _upright(value)
+        above, below = _split(value)
         if below != 1:
             return _fraction(scalar_tree(above), scalar_tree(below))
+    if value.is_Mul:
         content, rest = value.as_coeff_Mul()
         if content < 0:
             return -scalar_tree(-value)
@@ -301,6 +303,35 @@ def scalar_tree(value: Any) -> Expr:
     if isinstance(value, sp.Abs):
         return Expr("abs", (scalar_tree(value.args[0]),))
     raise NoMeasuresError
+
+
+def _split(value: Any) -> tuple[Any, Any]:
+    """Numerator and denominator, factors as they are."""
+    above, below = [], []
+    for factor in sp.Mul.make_args(value):
+        if factor.is_Rational:
+            above.append(sp.Integer(factor.p))
+            below.append(sp.Integer(factor.q))
+        elif factor.is_Pow and factor.exp.is_Rational and factor.exp < 0:
+            below.append(sp.Pow(factor.base, -factor.exp))
+        else:
+            above.append(factor)
+    return sp.Mul(*above), sp.Mul(*below, evaluate=len(below) < 2 or not any(b.is_Add for b in below))
+
+
+def _upright(value: Any) -> Any:
+    """A product in which differences such as ``u_0 - u_1`` stand as ``u_1 - u_0``."""
+    flipped, factors = False, []
+    for factor in sp.Mul.make_args(value):
+        base, exponent = factor.as_base_exp()
+        signs = {term.as_coeff_Mul() for term in base.args} if base.is_Add and len(base.args) == 2 else set()
+        if exponent.is_Integer and {sign for sign, _ in signs} == {1, -1} and all(s.is_Symbol for _, s in signs):
+            (first,), (second,) = ([_name(s) for sign, s in signs if sign == want] for want in (1, -1))
+            if first.base == second.base and first.sub < second.sub:
+                flipped ^= bool(exponent % 2)
+                factor = sp.Pow(sp.Add(*[-term for term in base.args]), exponent)
+        factors.append(factor)
+    return -sp.Mul(*factors) if flipped else value if factors == list(sp.Mul.make_args(value)) else sp.Mul(*factors)
 
 
 def _fraction(above: Expr, below: Expr) -> Expr:
@@ -331,12 +362,12 @@ def sum_tree(terms: Iterable[tuple[Any, tuple[Expr, ...]]]) -> Expr:
     joined: dict[tuple[Expr, ...], Any] = {}
     for value, factors in terms:
         joined[factors] = joined.get(factors, sp.S.Zero) + value
-    kept = [(sp.factor_terms(value), factors) for factors, value in joined.items() if value != 0]
+    kept = [(_upright(sp.factor_terms(value)), factors) for factors, value in joined.items() if value != 0]
     if not kept:
         return ZERO
     trees = []
     for value, factors in kept:
-        negative = value.could_extract_minus_sign()
+        negative = value.as_coeff_Mul()[0] < 0
         body = _product([scalar_tree(-value if negative else value), *factors])
         trees.append(-body if negative else body)
     return trees[0] if len(trees) == 1 else Expr("add", tuple(trees))
@@ -433,7 +464,7 @@ class Derivation:
     @property
     def law_tree(self) -> Expr:
         """The energy in terms of its measures."""
-        return scalar_tree(self.law)
+        return scalar_tree(sp.factor(self.law))
 
     def blocks(self, scale: int) -> Iterable[tuple[tuple[Expr, Expr], list[tuple[Expr, Expr]]]]:
         """For each unknown its gradient block and its Hessian blocks, each times ``scale``, as (name, tree)."""

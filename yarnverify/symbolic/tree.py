@@ -73,19 +73,19 @@ class Expr:
 
     # Arithmetic for declared energies; `*` keeps the order of its factors.
     def __add__(self, other: Expr | int) -> Expr:
-        return Expr("add", (self, as_expr(other)))
+        return Expr("add", (*self._joined("add"), as_expr(other)))
 
     def __radd__(self, other: int) -> Expr:
         return Expr("add", (as_expr(other), self))
 
     def __sub__(self, other: Expr | int) -> Expr:
-        return Expr("add", (self, Expr("neg", (as_expr(other),))))
+        return Expr("add", (*self._joined("add"), Expr("neg", (as_expr(other),))))
 
     def __rsub__(self, other: int) -> Expr:
         return Expr("add", (as_expr(other), Expr("neg", (self,))))
 
     def __mul__(self, other: Expr | int | Fraction) -> Expr:
-        return Expr("mul", (self, as_expr(other)))
+        return Expr("mul", (*self._joined("mul"), as_expr(other)))
 
     def __rmul__(self, other: int | Fraction) -> Expr:
         return Expr("mul", (as_expr(other), self))
@@ -103,6 +103,9 @@ class Expr:
 
     def __neg__(self) -> Expr:
         return Expr("neg", (self,))
+
+    def _joined(self, op: str) -> tuple[Expr, ...]:
+        return self.args if self.op == op else (self,)
 
     @property
     def T(self) -> Expr:

@@ -14,6 +14,7 @@ VARIANT = "printed"
 DOFS = ("x0.x", "x0.y", "x0.z", "x1.x", "x1.y", "x1.z", "x2.x", "x2.y", "x2.z", "u1", "u2")
 PARAMETERS = ("k_b",)
 
+
 def _energy(q: Array, k_b: Array, E: Array) -> None:
     x0x, x0y, x0z, x1x, x1y, x1z, x2x, x2y, x2z, u1, u2 = q
     t0 = u1 - u2

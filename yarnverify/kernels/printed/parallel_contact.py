@@ -12,6 +12,7 @@ VARIANT = "printed"
 DOFS = ("u0", "u1")
 PARAMETERS = ("k_c", "L", "d")
 
+
 def _energy(q: Array, k_c: Array, L: Array, d: Array, E: Array) -> None:
     u0, u1 = q
     dF_u0_du1 = L*k_c

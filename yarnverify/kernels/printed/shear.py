@@ -14,6 +14,7 @@ VARIANT = "printed"
 DOFS = ("x0.x", "x0.y", "x0.z", "x1.x", "x1.y", "x1.z", "x3.x", "x3.y", "x3.z")
 PARAMETERS = ("k_x", "L")
 
+
 def _energy(q: Array, k_x: Array, L: Array, E: Array) -> None:
     x0x, x0y, x0z, x1x, x1y, x1z, x3x, x3y, x3z = q
     t10 = L*k_x

@@ -15,6 +15,7 @@ VARIANT = "printed"
 DOFS = ("x0.x", "x0.y", "x0.z", "x1.x", "x1.y", "x1.z", "u0", "u1")
 PARAMETERS = ("k_s",)
 
+
 def _energy(q: Array, k_s: Array, E: Array) -> None:
     x0x, x0y, x0z, x1x, x1y, x1z, u0, u1 = q
     t0 = u0 - u1

@@ -1,0 +1,1 @@
+"""Pages from records: reads JSON data, and nothing else of the package."""

@@ -1,0 +1,74 @@
+"""The Markdown pages of a report, from its records."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+_TEMPLATES = Environment(
+    loader=FileSystemLoader(Path(__file__).parent / "templates"),
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    keep_trailing_newline=True,
+)
+
+
+def pages(records: dict[str, Any]) -> dict[str, str]:
+    """File name to text: an index, and a page an energy.
+
+    Parameters
+    ----------
+    records
+        ``verdicts``, ``derivations`` and ``kernels``, as written to ``records/``.
+    """
+    found, derived = records["verdicts"], records["derivations"]
+    texts = {
+        "README.md": _render("index.md.jinja", found=found, derived=derived, rows=_rows(found, ""), mistakes=_mistakes(found, None))
+    }
+    for name, derivation in derived.items():
+        section = derivation["section"]
+        texts[f"{name}.md"] = _render(
+            "energy.md.jinja",
+            name=name,
+            section=section,
+            found=found,
+            derivation=derivation,
+            rows=_rows(found, section),
+            mistakes=_mistakes(found, section),
+            completeness=next((part for part in found["completeness"] if part["section"] == section), None),
+            kernels=records["kernels"].get(name, {}),
+        )
+    return dict(sorted(texts.items()))
+
+
+def _render(template: str, **values: Any) -> str:
+    return _TEMPLATES.get_template(template).render(**values)
+
+
+def _rows(found: dict[str, Any], section: str) -> list[dict[str, Any]]:
+    """A row for each equation of a section and verdict."""
+    rows: dict[tuple[str, str], dict[str, Any]] = {}
+    for claim in found["claims"]:
+        if claim["section"] != section:
+            continue
+        row = rows.setdefault((claim["equation"], claim["verdict"]), {**claim, "blocks": []})
+        if claim["block"] not in row["blocks"]:
+            row["blocks"].append(claim["block"])
+    return list(rows.values())
+
+
+def _mistakes(found: dict[str, Any], section: str | None) -> list[dict[str, Any]]:
+    """What is not proved, in a section or anywhere: one entry for each equation and reason."""
+    groups: dict[tuple[str, str], dict[str, Any]] = {}
+    for claim in found["claims"]:
+        if claim["verdict"] == "proved" or (section is not None and claim["section"] != section):
+            continue
+        group = groups.setdefault((claim["equation"], claim["reason"]), {**claim, "blocks": []})
+        group["blocks"].append(claim["block"])
+    for group in groups.values():
+        if group["witness"]:
+            group["worst"] = max(range(len(group["witness"]["residual"])), key=lambda i, w=group["witness"]: abs(float(w["residual"][i])))
+    return list(groups.values())
