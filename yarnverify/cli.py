@@ -1,7 +1,7 @@
 """The command line: ``yarnverify prove | derive | generate | report``.
 
-Exit status: 0 all as expected; 1 a check failed, or an erratum is new or stale; 2 bad usage or input; 3 asked for but could
-not run. Heavy imports happen inside the commands, so that ``--help`` answers at once.
+Exit status: 0 all as expected; 1 a check failed, or an erratum is new or stale; 2 bad usage or input; 3 asked for but
+could not run. Heavy imports happen inside the commands, so that ``--help`` answers at once.
 """
 
 from __future__ import annotations
@@ -44,7 +44,13 @@ def progress(what: str) -> Iterator[Callable[[str, int], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[label]}"), TimeElapsedColumn())
+    columns = (
+        TextColumn(what),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[label]}"),
+        TimeElapsedColumn(),
+    )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(what, total=None, label="")
         yield lambda label, total: bar.update(task, advance=1, total=total, label=label)
@@ -64,7 +70,9 @@ def prove(
     /,
     *,
     derivations: Derivations = None,
-    json_file: Annotated[Path | None, Parameter(name="--json", help="Write the record here; - for standard output.")] = None,
+    json_file: Annotated[
+        Path | None, Parameter(name="--json", help="Write the record here; - for standard output.")
+    ] = None,
     cache: Annotated[bool, Parameter(help="Use and keep results that are already known.")] = True,
 ) -> None:
     """A verdict on every printed equation.
@@ -94,7 +102,9 @@ def derive(
     *,
     format: Literal["text", "latex", "markdown"] = "text",
     derivations: Annotated[Path | None, Parameter(help="Folder of declared energies.")] = None,
-    json_file: Annotated[Path | None, Parameter(name="--json", help="Write the derivation as JSON; - for standard output.")] = None,
+    json_file: Annotated[
+        Path | None, Parameter(name="--json", help="Write the derivation as JSON; - for standard output.")
+    ] = None,
 ) -> None:
     """The derivation of an energy: measures, their derivatives, the chain rule, the result.
 
@@ -119,7 +129,9 @@ def derive(
 def generate(
     *,
     check: Annotated[bool, Parameter(negative="", help="Compare with the files instead of writing them.")] = False,
-    json_file: Annotated[Path | None, Parameter(name="--json", help="Write names and operation counts; - for standard output.")] = None,
+    json_file: Annotated[
+        Path | None, Parameter(name="--json", help="Write names and operation counts; - for standard output.")
+    ] = None,
 ) -> None:
     """The kernels, from the derivations."""
     from yarnverify.generation import generate_kernels

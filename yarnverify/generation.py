@@ -49,7 +49,9 @@ def settle_files(folder: Path, texts: dict[str, str], check: bool, stale: list[s
             if old is None:
                 outcome.lines.append(f"{name}: is missing")
                 continue
-            shown = difflib.unified_diff(old.splitlines(), text.splitlines(), f"{name} (file)", f"{name} (generated)", lineterm="")
+            shown = difflib.unified_diff(
+                old.splitlines(), text.splitlines(), f"{name} (file)", f"{name} (generated)", lineterm=""
+            )
             outcome.lines += list(shown) or [f"{name}: line endings differ"]
             continue
         try:

@@ -82,7 +82,9 @@ def shelf_for(document: Path, text: str, choice: str | None = None) -> Shelf:
                 continue
             common = len(mine & _displays(other.read_text(encoding="utf-8")))
             if choice or 2 * common >= len(mine) > 0:
-                return Shelf(folder, name, f"by the energies declared for {name}, with which it shares {common} displays")
+                return Shelf(
+                    folder, name, f"by the energies declared for {name}, with which it shares {common} displays"
+                )
     return Shelf(None, document.name, "by itself alone: no declared energies belong to it")
 
 

@@ -36,7 +36,10 @@ def build_report(out: Path, check: bool, advance: Callable[[str, int], None] = l
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is not a folder")
     records, lines, expected = _records(advance)
-    texts = {f"records/{name}.json": json.dumps(record, indent=1, ensure_ascii=False) + "\n" for name, record in records.items()}
+    texts = {
+        f"records/{name}.json": json.dumps(record, indent=1, ensure_ascii=False) + "\n"
+        for name, record in records.items()
+    }
     texts |= pages({name: json.loads(texts[f"records/{name}.json"]) for name in records})
     there = {path.relative_to(out).as_posix() for pattern in ("*.md", "records/*.json") for path in out.glob(pattern)}
     outcome = settle_files(out, texts, check, sorted(there - set(texts)), "yarnverify report")

@@ -31,7 +31,9 @@ def equation_rows(record: dict[str, Any]) -> list[tuple[str, str, str, int]]:
     for claim in record["claims"]:
         key = (claim["equation"], claim["verdict"], claim["line"])
         rows.setdefault(key, []).append(claim["block"])
-    return [(equation, " ".join(dict.fromkeys(blocks)), verdict, line) for (equation, verdict, line), blocks in rows.items()]
+    return [
+        (equation, " ".join(dict.fromkeys(blocks)), verdict, line) for (equation, verdict, line), blocks in rows.items()
+    ]
 
 
 def _table(rows: list[tuple[str, str, str, int]]) -> None:
@@ -64,7 +66,9 @@ def mistakes(record: dict[str, Any]) -> list[dict[str, Any]]:
 def mistake_lines(record: dict[str, Any]) -> list[str]:
     lines: list[str] = []
     for claim in mistakes(record):
-        lines.append(f"({claim['equation']}) {', '.join(claim['blocks'])}: {claim['verdict'].upper()}, {claim['reason']}")
+        lines.append(
+            f"({claim['equation']}) {', '.join(claim['blocks'])}: {claim['verdict'].upper()}, {claim['reason']}"
+        )
         if claim["because"]:
             continue
         lines.append(f"    printed    {claim['printed']}")
@@ -76,7 +80,9 @@ def mistake_lines(record: dict[str, Any]) -> list[str]:
             lines.append(f"    effect     {claim['effect']}")
         if claim["witness"]:
             lines += _witness_lines(claim["witness"])
-        lines.append(f"    erratum    {'accepted: ' + claim['erratum'] if claim['erratum'] else 'new: not in errata.toml'}")
+        lines.append(
+            f"    erratum    {'accepted: ' + claim['erratum'] if claim['erratum'] else 'new: not in errata.toml'}"
+        )
     for part in record["completeness"]:
         for item in part["missing"]:
             lines.append(f"{part['section']}: the document does not list {item['latex']}, which is not zero")
@@ -103,7 +109,9 @@ def _witness_lines(witness: dict[str, Any]) -> list[str]:
 def tally_lines(record: dict[str, Any]) -> list[str]:
     tally = record["tally"]
     total = sum(tally.values())
-    counts = ", ".join(f"{count} {verdict}" for verdict, count in tally.items() if count or verdict in ("proved", "refuted"))
+    counts = ", ".join(
+        f"{count} {verdict}" for verdict, count in tally.items() if count or verdict in ("proved", "refuted")
+    )
     numbers = {claim["equation"] for claim in record["claims"] if not claim["equation"].startswith("line")}
     lines = [f"{total} claims in {len(numbers)} of {len(record['equations'])} numbered equations: {counts}."]
     if record["given"]:
@@ -117,7 +125,11 @@ def tally_lines(record: dict[str, Any]) -> list[str]:
         else f"Lists of non-zero forces and Jacobians: complete, {listed} blocks."
     )
     errata = record["errata"]
-    for kind, what in (("accepted", "Accepted errata"), ("new", "NEW, not in errata.toml"), ("stale", "STALE in errata.toml")):
+    for kind, what in (
+        ("accepted", "Accepted errata"),
+        ("new", "NEW, not in errata.toml"),
+        ("stale", "STALE in errata.toml"),
+    ):
         if errata[kind]:
             lines.append(f"{what}: {', '.join(f'({number})' for number in errata[kind])}.")
     lines.append(f"Judged {record['judged']}.")

@@ -49,7 +49,12 @@ def verdicts(
     path = document if document is not None else derivations() / MAIN_DOCUMENT
     source = load(path)
     shelf = shelf_for(path, source.text, choice)
-    parts: list[bytes | Path] = [source.name.encode(), source.text.encode(), shelf.document.encode(), shelf.how.encode()]
+    parts: list[bytes | Path] = [
+        source.name.encode(),
+        source.text.encode(),
+        shelf.document.encode(),
+        shelf.how.encode(),
+    ]
     parts += sorted(shelf.folder.glob("*.py")) if shelf.folder else []
     key = fingerprint(parts)
     record = recall(key) if cache else None

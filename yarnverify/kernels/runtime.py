@@ -132,11 +132,14 @@ def _run(
 
     finite = np.ones(n, bool)
     for array in out.values():
-        finite &= np.isfinite(array).reshape(-1, n).all(axis=0)
+        finite &= np.isfinite(array).all(axis=tuple(range(array.ndim - 1)))
     overflow = good & ~finite
     if overflow.any():
         for element in np.flatnonzero(overflow):
-            reasons.setdefault(int(element), "the result is not finite: an intermediate value is outside the range of " + str(rows.dtype))
+            reasons.setdefault(
+                int(element),
+                "the result is not finite: an intermediate value is outside the range of " + str(rows.dtype),
+            )
         bad |= overflow
     if bad.any():
         if errors == "raise":
@@ -183,7 +186,9 @@ def _parameters(kernel: Kernel, given: Mapping[str, ArrayLike], n: int, dtype: A
         if wrong.any():
             at = f"[{int(np.flatnonzero(wrong)[0])}]" if value.ndim else ""
             worst = value[wrong][0] if value.ndim else value
-            raise ValueError(f"{kernel.name}: {name}{at} = {worst} must be finite" + (" and not negative" if positive else ""))
+            raise ValueError(
+                f"{kernel.name}: {name}{at} = {worst} must be finite" + (" and not negative" if positive else "")
+            )
         values.append(dtype.type(value) if value.ndim == 0 else value.astype(dtype))
     return tuple(values)
 

@@ -26,7 +26,9 @@ def pages(records: dict[str, Any]) -> dict[str, str]:
     """
     found, derived = records["verdicts"], records["derivations"]
     texts = {
-        "README.md": _render("index.md.jinja", found=found, derived=derived, rows=_rows(found, ""), mistakes=_mistakes(found, None))
+        "README.md": _render(
+            "index.md.jinja", found=found, derived=derived, rows=_rows(found, ""), mistakes=_mistakes(found, None)
+        )
     }
     for name, derivation in derived.items():
         section = derivation["section"]
@@ -70,5 +72,6 @@ def _mistakes(found: dict[str, Any], section: str | None) -> list[dict[str, Any]
         group["blocks"].append(claim["block"])
     for group in groups.values():
         if group["witness"]:
-            group["worst"] = max(range(len(group["witness"]["residual"])), key=lambda i, w=group["witness"]: abs(float(w["residual"][i])))
+            sizes = [abs(float(value)) for value in group["witness"]["residual"]]
+            group["worst"] = sizes.index(max(sizes))
     return list(groups.values())

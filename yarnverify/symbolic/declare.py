@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import inspect
 import re
+import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -168,7 +169,9 @@ def _parameters(function: Callable[..., Any], hints: dict[str, Any]) -> dict[str
             continue
         kind = hints.get(key)
         if not isinstance(kind, Real):
-            raise TypeError(f'parameter {key!r} of {function.__name__} must be annotated Positive["unit"] or Real["unit"]')
+            raise TypeError(
+                f'parameter {key!r} of {function.__name__} must be annotated Positive["unit"] or Real["unit"]'
+            )
         found[key] = Parameter(name_of(key), kind.unit, kind.positive)
     return found
 
@@ -231,9 +234,7 @@ def quantity(
     def declare(function: Callable[..., Expr]) -> Quantity:
         hints = get_type_hints(function)
         ((members, _),) = parse(Source(f"symbol of {function.__name__}", symbol), 0, len(symbol))
-        return Quantity(
-            members[0].name, document, section, unit, function(**_unknowns(function, hints)), function
-        )
+        return Quantity(members[0].name, document, section, unit, function(**_unknowns(function, hints)), function)
 
     return declare
 
@@ -265,7 +266,8 @@ def load_declarations(folder: Path) -> Declarations:
         except SyntaxError as error:
             raise InputError(error.msg, (str(path), error.lineno or 1, error.offset or 1)) from None
         except Exception as error:
-            lines = [frame.lineno for frame in inspect.getinnerframes(error.__traceback__) if frame.filename == str(path)]  # type: ignore[arg-type]
+            frames = traceback.extract_tb(error.__traceback__)
+            lines = [frame.lineno for frame in frames if frame.filename == str(path) and frame.lineno]
             place = (str(path), lines[-1] if lines else 1, 1)
             raise InputError(f"{type(error).__name__}: {error}", place) from None
         for value in namespace.values():

@@ -181,7 +181,9 @@ class _Law:
             return value
         for assumption in self.section.assumptions:
             try:
-                known = self.scalar(self.section.expand(assumption.left)) - self.scalar(self.section.expand(assumption.right))
+                known = self.scalar(self.section.expand(assumption.left)) - self.scalar(
+                    self.section.expand(assumption.right)
+                )
             except NoMeasuresError:
                 continue
             if sp.expand(value - known) == 0:
@@ -213,7 +215,11 @@ class _Law:
                 return scale * inner, segment
         if op == "add" and len(args) == 2:
             plus = [arg.name for arg in args if arg.op == "symbol" and arg.name.bold]
-            minus = [arg.args[0].name for arg in args if arg.op == "neg" and arg.args[0].op == "symbol" and arg.args[0].name.bold]
+            minus = [
+                arg.args[0].name
+                for arg in args
+                if arg.op == "neg" and arg.args[0].op == "symbol" and arg.args[0].name.bold
+            ]
             if len(plus) == len(minus) == 1:
                 tail, head = sorted((plus[0], minus[0]), key=lambda n: (n.base, len(n.sub), n.sub))
                 return (sp.S.One if plus[0] == head else -sp.S.One), Segment(tail, head)
@@ -470,7 +476,9 @@ class Derivation:
         """For each unknown its gradient block and its Hessian blocks, each times ``scale``, as (name, tree)."""
         for row in self.unknowns:
             force = Expr("force", value=row)
-            rest = [(Expr("derivative", (force,), column), self.hessian(row, column, scale)) for column in self.unknowns]
+            rest = [
+                (Expr("derivative", (force,), column), self.hessian(row, column, scale)) for column in self.unknowns
+            ]
             yield (force, self.gradient(row, scale)), rest
 
 
@@ -514,7 +522,9 @@ def derive(
 def _assemble(
     section: Section, energy: Expr, law: Any, measures: tuple[Measure, ...], unknowns: tuple[Name, ...]
 ) -> Derivation:
-    own = Section(section.title, section.offset, parameters=section.parameters, unknowns=unknowns, declared=section.declared)
+    own = Section(
+        section.title, section.offset, parameters=section.parameters, unknowns=unknowns, declared=section.declared
+    )
     own.families |= section.families
     own.assumptions = [
         replace(a, left=section.expand(a.left), right=section.expand(a.right)) for a in section.assumptions

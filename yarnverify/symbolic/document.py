@@ -218,9 +218,7 @@ def _sections(source: Source, items: list[Heading | Relation]) -> tuple[Section,
     return shared, groups
 
 
-def read_document(
-    source: Source, declare: Callable[[Section], Energy | None] = lambda section: None
-) -> Document:
+def read_document(source: Source, declare: Callable[[Section], Energy | None] = lambda section: None) -> Document:
     """Read a document into sections with definitions, energies and claims.
 
     Parameters
@@ -248,7 +246,9 @@ def read_document(
             for relation in pending:
                 first = relation.members[0]
                 what = "an energy" if first.op == "energy" else "a claim"
-                source.fail(relation.offset, f"equation ({relation.equation}) states {what} before the first section heading")
+                source.fail(
+                    relation.offset, f"equation ({relation.equation}) states {what} before the first section heading"
+                )
             continue
         only_definitions = bool(own) and not pending and section.energy is None
         if only_definitions:
@@ -278,7 +278,7 @@ def _definitions(section: Section, own: Iterable[Relation]) -> list[Relation]:
             continue
         equal = replace(relation, members=relation.members[: count + 1], operators=relation.operators[:count])
         first, second = equal.members[:2]
-        if first.op == "energy" and section.energy is None and not section.title == "":
+        if first.op == "energy" and section.energy is None and section.title != "":
             section.energy = Definition(first.name, second, equal)
         elif (
             first.op == "symbol"
@@ -311,7 +311,9 @@ def _unknowns(section: Section, own: Iterable[Relation]) -> None:
         return
     section.families |= {(n.base, n.bold) for n in base if n.bold and _INDEX.match(n.sub)}
     section.parameters = tuple(name for name in base if not section.is_unknown(name))
-    section.unknowns = tuple(sorted((n for n in base if section.is_unknown(n)), key=lambda n: (not n.bold, n.base, n.sub)))
+    section.unknowns = tuple(
+        sorted((n for n in base if section.is_unknown(n)), key=lambda n: (not n.bold, n.base, n.sub))
+    )
 
 
 def _claims(relation: Relation) -> list[Claim]:
@@ -329,7 +331,10 @@ def _check_shapes(document: Document, groups: list[tuple[Section, list[Relation]
             try:
                 kinds = [section.type_of(member) for member in relation.members]
             except ShapeError as error:
-                document.source.fail(error.span[0], f"equation ({relation.equation}): {error.message}" if not relation.inline else error.message)
+                document.source.fail(
+                    error.span[0],
+                    f"equation ({relation.equation}): {error.message}" if not relation.inline else error.message,
+                )
             for operator, member, kind in zip(relation.operators, relation.members[1:], kinds[1:], strict=True):
                 if operator != "=" and kind not in (Type.SCALAR, Type.UNKNOWN):
                     document.source.fail(member.span[0], f"cannot compare a {kind.value} by {operator}")

@@ -34,14 +34,14 @@ def identifier(name: Name) -> str:
 
 def row_symbols(name: Name) -> list[sp.Symbol]:
     """The scalar unknowns of one degree of freedom: three for a point."""
-    return [sp.Symbol(name.label + axis, real=True) for axis in AXES] if name.bold else [sp.Symbol(name.label, real=True)]
+    return (
+        [sp.Symbol(name.label + axis, real=True) for axis in AXES] if name.bold else [sp.Symbol(name.label, real=True)]
+    )
 
 
 def dof_labels(unknowns: Iterable[Name]) -> tuple[str, ...]:
     """Names of the rows of ``q``, such as ``x0.x`` and ``u1``."""
-    return tuple(
-        label for n in unknowns for label in ([f"{n.label}.{axis}" for axis in AXES] if n.bold else [n.label])
-    )
+    return tuple(label for n in unknowns for label in ([f"{n.label}.{axis}" for axis in AXES] if n.bold else [n.label]))
 
 
 class Components(Reading):
@@ -93,12 +93,17 @@ class Components(Reading):
     def _named(self, value: Value, label: str) -> Value:
         if not isinstance(value, list):
             return self._step(value, label) if self.naming else value
-        return [self._named(part, label + ("_" if label[-1] not in AXES else "") + axis) for part, axis in zip(value, AXES, strict=True)]
+        return [
+            self._named(part, label + ("_" if label[-1] not in AXES else "") + axis)
+            for part, axis in zip(value, AXES, strict=True)
+        ]
 
     def symbol(self, name: Name) -> Value:
         if name not in self._values:
             meaning = self.section.meaning(name)
-            self._values[name] = self.leaf(name) if meaning is None else self._named(self.value(meaning), identifier(name))
+            self._values[name] = (
+                self.leaf(name) if meaning is None else self._named(self.value(meaning), identifier(name))
+            )
         return self._values[name]
 
     def block(self, expr: Expr) -> Value:
@@ -247,7 +252,9 @@ def _settled(
         needed = _needed(everything, values)
         operations[key] = int(sum(sp.count_ops(value) for value in (*needed.values(), *values)))
     new_checks = tuple((v, c[1], c[2]) for v, c in zip(rest[1 + g + h :], checks, strict=True))
-    return Program(everything, rest[0], tuple(outputs["gradient"]), tuple(outputs["hessian"]), new_checks, active, operations)
+    return Program(
+        everything, rest[0], tuple(outputs["gradient"]), tuple(outputs["hessian"]), new_checks, active, operations
+    )
 
 
 def _without_aliases(

@@ -8,7 +8,15 @@ from typing import Any
 from yarnverify.errors import InputError
 from yarnverify.library import derivations
 from yarnverify.symbolic.declare import Declarations, Energy, load_declarations
-from yarnverify.symbolic.derive import Derivation, Measure, Segment, declared_section, derive_declared, scalar_tree, sum_tree
+from yarnverify.symbolic.derive import (
+    Derivation,
+    Measure,
+    Segment,
+    declared_section,
+    derive_declared,
+    scalar_tree,
+    sum_tree,
+)
 from yarnverify.symbolic.latex import latex, name_latex
 from yarnverify.symbolic.plain import name_plain, plain
 from yarnverify.symbolic.prove import Court, Verdict
@@ -111,7 +119,9 @@ def _law(derivation: Derivation) -> Step:
     for i, first in enumerate(names):
         for second in names[i:]:
             formulas.append(_equal(_by(("V", "V"), first, second), scalar_tree(derivation.law_slope(first, second))))
-    return _step("Law", "The energy as a function of its measures and sliding coordinates, and its derivatives.", formulas)
+    return _step(
+        "Law", "The energy as a function of its measures and sliding coordinates, and its derivatives.", formulas
+    )
 
 
 def _chain_rule(derivation: Derivation) -> Step:
@@ -122,12 +132,16 @@ def _chain_rule(derivation: Derivation) -> Step:
         ),
         (
             "\\frac{\\partial^2 V}{\\partial q \\partial r} = \\sum_m \\frac{\\partial V}{\\partial m} \\frac{\\partial^2 m}"
-            "{\\partial q \\partial r} + \\sum_{m,n} \\frac{\\partial^2 V}{\\partial m \\partial n} \\frac{\\partial m}{\\partial q} "
-            "\\frac{\\partial n}{\\partial r}^T",
+            "{\\partial q \\partial r} + \\sum_{m,n} \\frac{\\partial^2 V}{\\partial m \\partial n} "
+            "\\frac{\\partial m}{\\partial q} \\frac{\\partial n}{\\partial r}^T",
             "∂²V/∂q∂r = Σ_m ∂V/∂m ∂²m/∂q∂r + Σ_mn ∂²V/∂m∂n ∂m/∂q (∂n/∂r)ᵀ",
         ),
     ]
-    note = "m and n run over the measures and the sliding coordinates. " if derivation.measures else "There are no measures: "
+    note = (
+        "m and n run over the measures and the sliding coordinates. "
+        if derivation.measures
+        else "There are no measures: "
+    )
     return _step("Chain rule", note + "Forces are minus gradients, Jacobians minus Hessians.", formulas)
 
 
@@ -142,7 +156,9 @@ def _result(derivation: Derivation) -> list[Step]:
 def _plain_steps(energy: Energy) -> list[Step]:
     court = Court(declared_section(energy), energy.expression)
     blocks = [Expr("force", value=name) for name in energy.unknowns]
-    values = [(latex(b), f"{plain(b)}: exact, {len(court.names)} symbols") for b in blocks if court.block(b) is not None]
+    values = [
+        (latex(b), f"{plain(b)}: exact, {len(court.names)} symbols") for b in blocks if court.block(b) is not None
+    ]
     note = "This energy is not a law of known measures: it is differentiated coordinate by coordinate."
     return [_step("Plain differentiation", note, values)]
 
@@ -154,7 +170,11 @@ def explain(record: dict[str, Any], form: str) -> str:
     verdict = (
         f"Proved exactly: the law and {count - 1} blocks, each by normal form and by rational evaluation."
         if record["all_proved"]
-        else "Proof: " + (", ".join(f"{b} {v}" for b, v in record["proof"].items() if v != "proved") or "not run for plain differentiation")
+        else "Proof: "
+        + (
+            ", ".join(f"{b} {v}" for b, v in record["proof"].items() if v != "proved")
+            or "not run for plain differentiation"
+        )
     )
     title = f"Derivation of {record['energy']}"
     if form == "text":

@@ -277,9 +277,7 @@ class Jet:
             scale, some = (a, other) if self.first is None else (b, self)
             return Jet(a * b) if some.first is None else Jet(a * b, some.first * scale, some.second * scale)
         mixed = np.outer(self.first, other.first)
-        return Jet(
-            a * b, self.first * b + other.first * a, self.second * b + other.second * a + mixed + mixed.T
-        )
+        return Jet(a * b, self.first * b + other.first * a, self.second * b + other.second * a + mixed + mixed.T)
 
     __rmul__ = __mul__
 
@@ -425,7 +423,9 @@ class Evaluation:
             return np.array([[constant(Fraction(int(i == j))) for j in range(3)] for i in range(3)], dtype=object)
         if op == "call" and expr.value != "arccos":
             sine, cosine = self._circle(expr.args[0], jets)
-            return {"sin": lambda: sine, "cos": lambda: cosine, "tan": lambda: sine / _nonzero(cosine)}[str(expr.value)]()
+            return {"sin": lambda: sine, "cos": lambda: cosine, "tan": lambda: sine / _nonzero(cosine)}[
+                str(expr.value)
+            ]()
         values = [self._value(arg, jets) for arg in expr.args]
         first = values[0]
         if op == "add":
@@ -538,7 +538,9 @@ class Evaluation:
         if op == "neg":
             scale = Fraction(-1)
         elif op in {"frac", "mul"}:
-            numbers = [p for p in expr.args if p.op == "number" or (p.op == "frac" and all(a.op == "number" for a in p.args))]
+            numbers = [
+                p for p in expr.args if p.op == "number" or (p.op == "frac" and all(a.op == "number" for a in p.args))
+            ]
             parts = tuple(p for p in expr.args if p not in numbers)
             if len(parts) != 1 or (op == "frac" and parts[0] is not expr.args[0]):
                 return None
@@ -576,7 +578,16 @@ def entries(value: Any) -> list[Any]:
 
 # -- states -----------------------------------------------------------------------------------------------------------
 
-_QUATERNIONS = [(1, 1, 1, 0), (1, 1, 0, 1), (2, 1, 0, 1), (1, 2, 1, 1), (2, 1, 1, 1), (1, -2, 2, 0), (3, 1, 1, 0), (2, 3, 1, 1)]
+_QUATERNIONS = [
+    (1, 1, 1, 0),
+    (1, 1, 0, 1),
+    (2, 1, 0, 1),
+    (1, 2, 1, 1),
+    (2, 1, 1, 1),
+    (1, -2, 2, 0),
+    (3, 1, 1, 0),
+    (2, 3, 1, 1),
+]
 _TRIPLES = [(4, 3), (-3, 4), (12, 5), (5, -12), (-15, 8), (-7, 24), (21, 20), (-4, 3)]
 _QUADRUPLES = [(1, 2, 2), (2, 3, 6), (1, 4, 8), (4, 4, 7), (2, 6, 9), (6, 6, 7), (3, 4, 12)]
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 from yarnverify.symbolic.tree import Expr, Name
 
+# The vocabulary that the grammar reads.
 GREEK = (
-    "alpha beta gamma delta epsilon varepsilon zeta eta theta vartheta iota kappa lambda mu nu xi rho varrho sigma tau "
-    "upsilon phi varphi chi psi omega Gamma Theta Lambda Xi Sigma Upsilon Phi Psi Omega"
-).split()
+    "alpha", "beta", "gamma", "delta", "epsilon", "varepsilon", "zeta", "eta", "theta", "vartheta", "iota", "kappa", "lambda",
+    "mu", "nu", "xi", "rho", "varrho", "sigma", "tau", "upsilon", "phi", "varphi", "chi", "psi", "omega", "Gamma", "Theta",
+    "Lambda", "Xi", "Sigma", "Upsilon", "Phi", "Psi", "Omega",
+)  # fmt: skip
 ACCENTS = ("bar", "hat", "tilde")
 FUNCTIONS = ("sin", "cos", "tan", "arccos")
 

@@ -11,7 +11,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from yarnverify.errors import NotRunError
 from yarnverify.source import load
 from yarnverify.symbolic.declare import Declarations, Energy, load_declarations
-from yarnverify.symbolic.derive import derive_declared, declared_section
+from yarnverify.symbolic.derive import declared_section, derive_declared
 from yarnverify.symbolic.document import Claim, Document, Section, block_of
 from yarnverify.symbolic.emit import Program, dof_labels, identifier, plain_program, program, statements, used_functions
 from yarnverify.symbolic.prove import Court, Verdict, read_with
@@ -111,7 +111,9 @@ def _mend(section: Section, claim: Claim) -> tuple[tuple[Expr, ...], str]:
     court = Court(section, section.energy.expression)
     repair = Workshop(court, claim.relation.members, lambda trees: [(t, trees[-1]) for t in trees[:-1]]).find()
     if repair is None:
-        raise NotRunError(f"equation ({claim.relation.equation}) uses an undefined symbol and cannot be evaluated as printed")
+        raise NotRunError(
+            f"equation ({claim.relation.equation}) uses an undefined symbol and cannot be evaluated as printed"
+        )
     return repair.members, f"equation ({claim.relation.equation}) cannot be evaluated as printed: {describe(repair)}"
 
 
@@ -128,7 +130,9 @@ _NAMES = ("DOFS", "KERNEL", "PARAMETERS", "VARIANT", "energy", "evaluate", "grad
 
 
 def _face(energy: Energy, default: str) -> str:
-    return _TEMPLATES.get_template("face.py.jinja").render(title=_title(energy), energy=energy, default=default, names=_NAMES)
+    return _TEMPLATES.get_template("face.py.jinja").render(
+        title=_title(energy), energy=energy, default=default, names=_NAMES
+    )
 
 
 def _title(energy: Energy) -> str:
@@ -163,7 +167,12 @@ def _module(energy: Energy, variant: str, made: Program, document: str, notes: l
             ("gradient", vector, "Gradient of each element; the force is its negative", "Array"),
             ("hessian", full, "Hessian of each element, exactly symmetric", "Array"),
             ("evaluate", f"(n,), {vector} and {full}", "Energy, gradient and Hessian, sharing what they share", three),
-            ("packed", f"(n,), {vector} and {upper}", "Energy, gradient and the Hessian's upper triangle, row by row", three),
+            (
+                "packed",
+                f"(n,), {vector} and {upper}",
+                "Energy, gradient and the Hessian's upper triangle, row by row",
+                three,
+            ),
         ),
     )
 
@@ -188,7 +197,14 @@ def _functions(made: Program, rows: list[str], names: list[str]) -> list[dict[st
         ("_evaluate", {**energy, **gradient, **hessian}, "EGH"),
     ):
         arguments = ", ".join([*inputs, *(f"{target}: Array" for target in targets)])
-        found.append({"name": name, "arguments": arguments, "returns": "None", "lines": [unpack, *statements(made.steps, outputs)]})
+        found.append(
+            {
+                "name": name,
+                "arguments": arguments,
+                "returns": "None",
+                "lines": [unpack, *statements(made.steps, outputs)],
+            }
+        )
     margins = {f"margin{i}": check[0] for i, check in enumerate(made.checks)}
     lines = [unpack, *statements(made.steps, margins)] if margins else []
     lines.append(f"return ({''.join(f'{margin}, ' for margin in margins).strip()})")

@@ -26,13 +26,13 @@ from typing import Any
 
 from sympy import QQ
 from sympy.polys.orderings import lex
-from sympy.polys.rings import PolyElement, ring
+from sympy.polys.rings import ring
 
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.reading import Reading, UnsupportedError, Value
 from yarnverify.symbolic.tree import Name
 
-Poly = PolyElement
+Poly = Any  # a SymPy PolyElement
 _SPARE = 12  # generators kept free for square roots and angles that are met on the way
 
 
@@ -467,7 +467,10 @@ def _rational_root(value: Any) -> tuple[Any, Any]:
     from sympy import factorint
 
     outside, inside = QQ(1), QQ(1)
-    for prime, power in [*factorint(value.numerator).items(), *((p, -e) for p, e in factorint(value.denominator).items())]:
+    for prime, power in [
+        *factorint(value.numerator).items(),
+        *((p, -e) for p, e in factorint(value.denominator).items()),
+    ]:
         outside *= QQ(prime) ** (power // 2)
         inside *= QQ(prime) ** (power % 2)
     return outside, inside

@@ -217,13 +217,18 @@ class Court:
             return Finding(Verdict.INCONSISTENT, "different as normal forms, equal at every exact state tried")
         witness = self.certify(state, left, right)
         if witness is None:
-            return Finding(Verdict.UNDECIDED, "the exact readings differ, but no ball arithmetic could tell the sides apart")
+            return Finding(
+                Verdict.UNDECIDED, "the exact readings differ, but no ball arithmetic could tell the sides apart"
+            )
         return Finding(Verdict.REFUTED, "", witness)
 
 
 def _spread(state: dict[Name, Any]) -> Fraction:
     """Sum of squared coordinates: small states are pleasant to read and to type in."""
-    return sum((part * part for value in state.values() for part in (value if isinstance(value, tuple) else (value,))), Fraction(0))
+    return sum(
+        (part * part for value in state.values() for part in (value if isinstance(value, tuple) else (value,))),
+        Fraction(0),
+    )
 
 
 def _flat(value: Value) -> list[Quotient]:
@@ -237,8 +242,9 @@ def _flat(value: Value) -> list[Quotient]:
 class Judged:
     """A claim with its finding. ``kind`` is definition, energy, force, jacobian or identity.
 
-    ``court`` is where it may be mended: with the declared definitions where printed ones are refuted. ``because`` names the equations whose mistake explains this one; ``index`` is the running index of a definition and the
-    value that it was judged at.
+    ``court`` is where it may be mended: with the declared definitions where printed ones are refuted. ``because`` names
+    the equations whose mistake explains this one; ``index`` is the running index of a definition and the value that it
+    was judged at.
     """
 
     section: Section
@@ -297,7 +303,9 @@ def try_document(
     judged: list[Judged] = []
     given: list[tuple[Section, Definition, str]] = []
     completeness: list[Completeness] = []
-    definitions = [item for part in (document.shared, *document.sections) for item in _definition_claims(part, declarations)]
+    definitions = [
+        item for part in (document.shared, *document.sections) for item in _definition_claims(part, declarations)
+    ]
     for section, definition, quantity in definitions:
         if quantity is None:
             given.append((section, definition, "definition"))

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from lark import Lark, Token, Transformer, v_args
@@ -138,10 +139,10 @@ class _Bars:
     """Tells an opening bar from a closing one: a bar after something complete, inside bars, closes them."""
 
     always_accept = ("BARS", "BAR", "UNKNOWN_COMMAND", "UNKNOWN_CHARACTER")
-    _PAIRS: dict[str, str] = {"BARS": "NORM", "BAR": "ABS"}
-    _OPENERS = {"LPAR", "LSQB", "LBRACE", "LEFT_PAREN", "LEFT_BRACKET"}
-    _CLOSERS = {"RPAR", "RSQB", "RBRACE", "RIGHT_PAREN", "RIGHT_BRACKET"}
-    _COMPLETE = {"LETTER", "GREEK", "NUMBER", "PI", "TRANSPOSE", "SUP_DIGIT", "SUB_CHARACTER", "SHORT_FRAC"}
+    _PAIRS = MappingProxyType({"BARS": "NORM", "BAR": "ABS"})
+    _OPENERS = frozenset({"LPAR", "LSQB", "LBRACE", "LEFT_PAREN", "LEFT_BRACKET"})
+    _CLOSERS = frozenset({"RPAR", "RSQB", "RBRACE", "RIGHT_PAREN", "RIGHT_BRACKET"})
+    _COMPLETE = frozenset({"LETTER", "GREEK", "NUMBER", "PI", "TRANSPOSE", "SUP_DIGIT", "SUB_CHARACTER", "SHORT_FRAC"})
 
     def process(self, stream: Iterator[Token]) -> Iterator[Token]:
         stack: list[str] = []
@@ -265,7 +266,10 @@ class _Build(Transformer[Token, Any]):
         if letter.base == "F":
             if not isinstance(sub, Name):
                 what = "F" + (f"_{sub}" if sub else "")
-                self.complain(meta.start_pos + self.shift, f"{what} names no unknown: write F_{{u_1}} or \\mathbf{{F}}_{{\\mathbf{{x}}_1}}")
+                self.complain(
+                    meta.start_pos + self.shift,
+                    f"{what} names no unknown: write F_{{u_1}} or \\mathbf{{F}}_{{\\mathbf{{x}}_1}}",
+                )
             return self._node(meta, "force", value=sub)
         if letter == Name("V"):
             return self._node(meta, "energy", value=name)
@@ -282,7 +286,7 @@ class _Build(Transformer[Token, Any]):
 
     def bold_zero(self, meta: Meta, items: list[Token]) -> Name:
         if str(items[0]) != "0":
-            self.complain(items[0].start_pos + self.shift, "the only bold number is the zero vector \\mathbf{0}")
+            self.complain(meta.start_pos + self.shift, "the only bold number is the zero vector \\mathbf{0}")
         return Name("0", bold=True)
 
     def accented(self, meta: Meta, items: list[Any]) -> Name:
@@ -314,7 +318,7 @@ def _parser() -> Lark:
         (Path(__file__).parent / "grammar.lark").read_text(encoding="utf-8"),
         parser="lalr",
         lexer="basic",
-        postlex=_Bars(),  # type: ignore[arg-type]
+        postlex=_Bars(),
         start=["relations", "mention"],
         propagate_positions=True,
         maybe_placeholders=True,
@@ -340,10 +344,11 @@ def parse(source: Source, begin: int, end: int, start: str = "relations") -> Any
         tree = _parser().parse(formula, start=start)
     except UnexpectedToken as error:
         token = error.token
-        offset = begin + (len(formula) if token.type == "$END" else token.start_pos or 0)
+        offset = begin + (len(formula) if token.type == "$END" else (token.start_pos or 0))
         source.fail(offset, _explain(token))
     except UnexpectedCharacters as error:
-        source.fail(begin + error.pos_in_stream, f"unexpected character {formula[error.pos_in_stream]!r}")
+        at = error.pos_in_stream or 0
+        source.fail(begin + at, f"unexpected character {formula[at]!r}")
     builder = _Build(begin, source.fail)
     try:
         return builder.transform(tree)

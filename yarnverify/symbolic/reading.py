@@ -135,21 +135,21 @@ class Reading(ABC):
         if scale is None:
             return value
         scale = self.hold(scale)
-        return map_value(value, lambda v: scale * v)
+        return scaled(value, scale)
 
     def _chain(self, factors: list[tuple[Value, str]]) -> tuple[Value, str]:
         for i in range(len(factors) - 1):
             if factors[i][1] == "vector" and factors[i + 1][1] == "covector":
                 (left, _), (right, kind) = self._chain(factors[: i + 1]), self._chain(factors[i + 1 :])
                 if kind == "scalar":
-                    return map_value(left, lambda v: v * right), "vector"
+                    return scaled(left, right), "vector"
                 left, right = map_value(left, self.hold), map_value(right, self.hold)
                 return [[a * b for b in right] for a in left], "matrix"
         (left, kind), *rest = factors
         for right, other in rest:
             if kind == "scalar":
                 scale = self.hold(left)
-                left, kind = map_value(right, lambda v, s=scale: s * v), other  # type: ignore[misc]
+                left, kind = scaled(right, scale), other
             elif (kind, other) == ("covector", "vector"):
                 left, kind = fold([a * b for a, b in zip(left, right, strict=True)], plus), "scalar"
             elif (kind, other) == ("covector", "matrix"):
@@ -169,6 +169,10 @@ class Reading(ABC):
 
 def map_value(value: Value, change: Callable[[Any], Any]) -> Value:
     return [map_value(v, change) for v in value] if isinstance(value, list) else change(value)
+
+
+def scaled(value: Value, scale: Any) -> Value:
+    return map_value(value, lambda v: scale * v)
 
 
 def plus(left: Value, right: Value) -> Value:

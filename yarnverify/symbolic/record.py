@@ -107,7 +107,11 @@ def _reason(judged: Judged) -> str:
     if finding.reason:
         return finding.reason
     if finding.verdict is Verdict.REFUTED:
-        return "differs from the declared one" if judged.kind in ("definition", "energy") else "differs from the true value"
+        return (
+            "differs from the declared one"
+            if judged.kind in ("definition", "energy")
+            else "differs from the true value"
+        )
     return ""
 
 

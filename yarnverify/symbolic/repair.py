@@ -141,7 +141,9 @@ class Workshop:
             yield 1, "transpose", node, after
         if node.op == "number":
             value = int(str(node.value))
-            for other in sorted({0, 1, 2, 3, 4, 6, 8, value - 1, value + 1} - {value}, key=lambda n: (abs(n - value), n)):
+            for other in sorted(
+                {0, 1, 2, 3, 4, 6, 8, value - 1, value + 1} - {value}, key=lambda n: (abs(n - value), n)
+            ):
                 if other >= 0:
                     yield 2, "number", node, number(other)
         if node.op == "pow":
