@@ -83,7 +83,12 @@ def test_a_definition_that_goes_on_is_a_claim_too() -> None:
 def test_expansion_follows_definitions_to_the_end() -> None:
     found = section(r"$l_i = u_i - u_0$", r"$\theta = l_1 l_2$")
     assert found.expand(read_formula(r"2 \theta")) == read_formula("2 ((u_1 - u_0) (u_2 - u_0))")
-    assert found.base_symbols(read_formula(r"\theta + k")) == [Name("u", "1"), Name("u", "0"), Name("u", "2"), Name("k")]
+    assert found.base_symbols(read_formula(r"\theta + k")) == [
+        Name("u", "1"),
+        Name("u", "0"),
+        Name("u", "2"),
+        Name("k"),
+    ]
 
 
 def test_a_recursion_that_ends_is_no_circle() -> None:
@@ -160,7 +165,10 @@ def test_claims_of_a_display(formula: str, expected: list[str]) -> None:
 
 
 def test_blocks_are_named_after_forces_and_unknowns() -> None:
-    blocks = [block_of(read_formula(t)) for t in (r"-\frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial u_0}", r"\theta", "2 a")]
+    blocks = [
+        block_of(read_formula(t))
+        for t in (r"-\frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial u_0}", r"\theta", "2 a")
+    ]
     assert blocks == ["dF_x1/du0", "theta", ""]
 
 
@@ -183,7 +191,7 @@ def wrapped(text: str) -> str:
     def heading(match: re.Match[str]) -> str:
         nonlocal count
         count += 1
-        return f"{count} {match[1]}\n\nEnergy of the segment $[\\mathbf{{q}}_0, \\mathbf{{q}}_1]$ of \\mathbf{{q}}_0 , for $k_s$:"
+        return f"{count} {match[1]}\n\nEnergy of the part $[\\mathbf{{q}}_0, \\mathbf{{q}}_1]$ of \\mathbf{{q}}_0 , for $k_s$:"
 
     text = re.sub(r"^# (.*)", r"\n\n\1\n\nSomebody Else\n\n12 Street, Town\n", text, flags=re.MULTILINE)
     text = re.sub(r"^## (.*)", heading, text, flags=re.MULTILINE)
@@ -220,7 +228,7 @@ OTHER = ENERGY.replace("(1)", "(2)")
         (["# S", ENERGY, "# R", OTHER], ["S", "R"]),
         (["1 Stretch", ENERGY, "2 Bending", OTHER], ["Stretch", "Bending"]),
         (["Prose", "1. Stretch", ENERGY, "2. Bending", OTHER], ["Stretch", "Bending"]),
-        (["# Title", "1 Stretch", ENERGY, "1.1 Forces", "$$F_{u_1} = -k u_1 \\quad (3)$$", "2 Bending", OTHER], ["Stretch", "Bending"]),
+        (["# T", "1 Stretch", ENERGY, "1.1 Forces", "$$F_{u_1} = 0 \\quad (3)$$", "2 Bending", OTHER], ["Stretch", "Bending"]),
         (["# Title", "## S", "### Energy", ENERGY, "### Forces", "## R", OTHER], ["S", "R"]),
         (["# Title", "## Notation", r"$$l_i = u_i - u_0 \quad (3)$$", "## S", ENERGY], ["S"]),
         (["# Title", "## S", ENERGY, "## Notation", r"$$l_i = u_i - u_0 \quad (3)$$"], ["S"]),
@@ -248,12 +256,18 @@ def test_definitions_of_one_section_do_not_reach_another() -> None:
 
 
 def test_without_declared_energies_symbols_are_told_apart_by_the_printed_energy() -> None:
-    lines = ["## S", r"$$V_{0,1} = k_s L \|\mathbf{p}_1 - \mathbf{p}_0\| (u_1 - v_0) \quad (1)$$", r"$$F_{w_1} = 0 \quad (2)$$"]
+    lines = [
+        "## S",
+        r"$$V_{0,1} = k_s L \|\mathbf{p}_1 - \mathbf{p}_0\| (u_1 - v_0) \quad (1)$$",
+        r"$$F_{w_1} = 0 \quad (2)$$",
+    ]
     (found,) = document(*lines).sections
     assert found.energy is not None and found.energy.symbol == Name("V", "0,1")
     assert list(map(str, found.parameters)) == ["k_s", "L"]
     assert list(map(str, found.unknowns)) == ["p_0", "p_1", "u_1", "v_0"]
-    kinds = [found.lookup(name) for name in (Name("p", "1", True), Name("u", "3"), Name("w", "1"), Name("L"), Name("q"))]
+    kinds = [
+        found.lookup(name) for name in (Name("p", "1", True), Name("u", "3"), Name("w", "1"), Name("L"), Name("q"))
+    ]
     assert kinds == [Type.VECTOR, Type.SCALAR, Type.SCALAR, Type.SCALAR, Type.UNKNOWN]
 
 
@@ -270,7 +284,11 @@ def test_without_declared_energies_symbols_are_told_apart_by_the_printed_energy(
         (["## S", r"where $\theta = u_1$ and $V > 0$"], "1:1", "no section with an energy"),
         ([ENERGY], "1:1", r"equation (1) states an energy before the first section heading"),
         (["x", ENERGY, "## S", OTHER], "3:1", r"equation (1) states an energy before the first section heading"),
-        (["$$F_{u_1} = 0 \\quad (7)$$", "## S", ENERGY], "1:1", "equation (7) states a claim before the first section heading"),
+        (
+            ["$$F_{u_1} = 0 \\quad (7)$$", "## S", ENERGY],
+            "1:1",
+            "equation (7) states a claim before the first section heading",
+        ),
         (["# T", "words"], "1:1", "no numbered formulas"),
         (["words $a$"], "1:1", "no numbered formulas"),
     ],

@@ -20,7 +20,7 @@ from yarnverify.errors import InputError
 from yarnverify.library import shelf_for
 from yarnverify.source import Source
 from yarnverify.symbolic.declare import Declarations
-from yarnverify.symbolic.document import Claim, Document, Section
+from yarnverify.symbolic.document import Document, Section
 from yarnverify.symbolic.latex import latex
 from yarnverify.symbolic.prove import Court, Verdict, declared_meaning, definition_claim, read_with
 from yarnverify.symbolic.reader import read_formula
@@ -286,7 +286,11 @@ def test_every_wrong_mutant_is_refuted_and_every_right_one_proved(paper: Paper, 
         trials = paper.trials(equation, members)
         findings = [court.judge(left, right) for court, left, right in trials]
         verdicts = {finding.verdict for finding in findings}
-        if verdicts != {Verdict.PROVED} if right else not {Verdict.REFUTED} <= verdicts <= {Verdict.REFUTED, Verdict.PROVED}:
+        if (
+            verdicts != {Verdict.PROVED}
+            if right
+            else not {Verdict.REFUTED} <= verdicts <= {Verdict.REFUTED, Verdict.PROVED}
+        ):
             failures.append(f"{kind}, {'right' if right else 'wrong'}: {printed(members)}: {[*map(str, findings)]}")
     assert wrong >= 4
     assert not failures, "\n".join(failures)
@@ -356,18 +360,33 @@ REWRITINGS = [  # (equation, right side); each is the printed one written otherw
     ("7", r"\frac{1}{2} (\mathbf{w}_1^T \mathbf{w}_1 - 1) k_s"),
     ("7", r"\frac{1}{2} (\mathbf{w}_1 \cdot \mathbf{w}_1 - 1) k_s"),
     ("7", r"\frac{k_s}{2} (\|\mathbf{w}_1\| - 1) (\|\mathbf{w}_1\| + 1)"),
-    ("8", r"-\frac{k_s}{l_1} \mathbf{d}_1 \mathbf{d}_1^T + k_s \left( \frac{1}{l_1} - \frac{1}{\Delta u} \right) \mathbf{I}"),
+    (
+        "8",
+        r"-\frac{k_s}{l_1} \mathbf{d}_1 \mathbf{d}_1^T + k_s \left( \frac{1}{l_1} - \frac{1}{\Delta u} \right) \mathbf{I}",
+    ),
     ("9", r"-\frac{k_s l_1^2}{(u_1 - u_0)^3}"),
     ("10", r"k_s (\Delta u)^{-1} \mathbf{w}_1"),
     ("11", r"\frac{k_s \|\mathbf{w}_1\|}{u_1 - u_0} \mathbf{d}_1^T"),
     ("12", r"\pi - \arccos(\mathbf{d}_2^T \mathbf{d}_1)"),
-    ("12", r"\arccos \left( -\frac{(\mathbf{x}_1 - \mathbf{x}_0) \cdot (\mathbf{x}_2 - \mathbf{x}_0)}{l_1 l_2} \right)"),
+    (
+        "12",
+        r"\arccos \left( -\frac{(\mathbf{x}_1 - \mathbf{x}_0) \cdot (\mathbf{x}_2 - \mathbf{x}_0)}{l_1 l_2} \right)",
+    ),
     ("13", r"\theta \frac{k_b}{u_1 - u_2} \theta"),
-    ("14", r"-\frac{2 k_b \theta}{l_1 (u_1 - u_2) \sin \theta} (\mathbf{d}_2 - \mathbf{d}_1 \mathbf{d}_1^T \mathbf{d}_2)"),
+    (
+        "14",
+        r"-\frac{2 k_b \theta}{l_1 (u_1 - u_2) \sin \theta} (\mathbf{d}_2 - \mathbf{d}_1 \mathbf{d}_1^T \mathbf{d}_2)",
+    ),
     ("14", r"-\frac{2 k_b \theta}{l_1 (u_1 - u_2) \sin \theta} (\mathbf{d}_2 + \cos \theta \mathbf{d}_1)"),
     ("14", r"\frac{2 k_b \theta}{(u_2 - u_1) \sin \theta} \frac{1}{l_1} \mathbf{P}_1 \mathbf{P}_1 \mathbf{d}_2"),
-    ("14", r"-\frac{k_b \theta}{l_1 (u_1 - u_2) \sin(\frac{\theta}{2}) \cos(\frac{\theta}{2})} \mathbf{P}_1 \mathbf{d}_2"),
-    ("14", r"-\frac{k_b \theta}{l_1 (u_1 - u_2) \sin \frac{\theta}{2} \cos \frac{\theta}{2}} \mathbf{P}_1 \mathbf{d}_2"),
+    (
+        "14",
+        r"-\frac{k_b \theta}{l_1 (u_1 - u_2) \sin(\frac{\theta}{2}) \cos(\frac{\theta}{2})} \mathbf{P}_1 \mathbf{d}_2",
+    ),
+    (
+        "14",
+        r"-\frac{k_b \theta}{l_1 (u_1 - u_2) \sin \frac{\theta}{2} \cos \frac{\theta}{2}} \mathbf{P}_1 \mathbf{d}_2",
+    ),
     ("14", r"-\frac{2 k_b \theta}{l_1 (u_1 - u_2) \|\mathbf{d}_1 \times \mathbf{d}_2\|} \mathbf{P}_1 \mathbf{d}_2"),
     ("14", r"\frac{2 k_b \theta}{l_1 (u_1 - u_2) \sin \theta} \mathbf{d}_1 \times (\mathbf{d}_1 \times \mathbf{d}_2)"),
     ("14", r"-\frac{2 k_b \theta}{l_1 (u_1 - u_2) \tan \theta \cos \theta} \mathbf{P}_1 \mathbf{d}_2"),
@@ -377,16 +396,23 @@ REWRITINGS = [  # (equation, right side); each is the printed one written otherw
     ("16", r"-\mathbf{F}_{\mathbf{x}_2} - \mathbf{F}_{\mathbf{x}_1}"),
     (
         "18",
-        CURVED + r"\left( \theta (\mathbf{P}_1 \mathbf{d}_2 \mathbf{d}_1^T + (\mathbf{P}_1 \mathbf{d}_2 \mathbf{d}_1^T)^T"
+        CURVED
+        + r"\left( \theta (\mathbf{P}_1 \mathbf{d}_2 \mathbf{d}_1^T + (\mathbf{P}_1 \mathbf{d}_2 \mathbf{d}_1^T)^T"
         r" + \mathbf{d}_1^T \mathbf{d}_2 \mathbf{P}_1) + \frac{\theta \cos \theta - \sin \theta}{\sin^2 \theta}"
         r" (\mathbf{P}_1 \mathbf{d}_2) (\mathbf{P}_1 \mathbf{d}_2)^T \right)",
     ),
-    ("22", r"-\frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial \mathbf{x}_2} - \frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial \mathbf{x}_1}"),
+    (
+        "22",
+        r"-\frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial \mathbf{x}_2} - \frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial \mathbf{x}_1}",
+    ),
     ("24", r"\frac{2 k_b \theta^2}{(u_2 - u_1)^3}"),
     ("28", r"\frac{2 k_b \theta}{l_1 (u_1 - u_2)^2 \sin \theta} (\mathbf{P}_1 \mathbf{d}_2)^T"),
     ("32", r"\frac{1}{8} k_x L (2 \phi - \pi)^2"),
     ("32", r"\frac{1}{2} k_x L \left( \arccos(-\mathbf{d}_1^T \mathbf{d}_3) - \frac{\pi}{2} \right)^2"),
-    ("33", r"\frac{k_x L (\phi - \frac{\pi}{2})}{l_1 \cos(\phi - \frac{\pi}{2})} (\mathbf{d}_3 - \cos \phi \mathbf{d}_1)"),
+    (
+        "33",
+        r"\frac{k_x L (\phi - \frac{\pi}{2})}{l_1 \cos(\phi - \frac{\pi}{2})} (\mathbf{d}_3 - \cos \phi \mathbf{d}_1)",
+    ),
     ("43", r"-L k_c (d + u_0 - u_1)"),
     ("43", r"-k_c L |d - \Delta u|"),
     ("44", r"-\frac{L^2 k_c}{L}"),

@@ -43,7 +43,9 @@ def alone(text: str) -> Record:
 
 
 def changed(source: Source, equation: str, old: str, new: str) -> str:
-    display = next(d for d in re.findall(r"\$\$.*?\$\$", source.text, re.DOTALL) if d.endswith(rf"\quad ({equation})$$"))
+    display = next(
+        d for d in re.findall(r"\$\$.*?\$\$", source.text, re.DOTALL) if d.endswith(rf"\quad ({equation})$$")
+    )
     assert old in display
     return source.text.replace(display, display.replace(old, new))
 
@@ -61,10 +63,6 @@ def proved(text: str) -> Record:
 
 def claims(record: Record, equation: str) -> list[Record]:
     return [claim for claim in record["claims"] if claim["equation"] == equation]
-
-
-def verdicts(record: Record) -> dict[str, set[str]]:
-    return {c["equation"]: {d["verdict"] for d in claims(record, c["equation"])} for c in record["claims"]}
 
 
 def findings(record: Record) -> set[str]:
@@ -242,11 +240,13 @@ def test_without_a_certificate_nothing_is_refuted(spring: Court, monkeypatch: py
 
 
 def test_balls_that_have_no_value_certify_nothing(spring: Court) -> None:
-    state = {name: (Fraction(0),) * 3 if name.bold else Fraction(1) for name in spring.names}  # both points at one place
+    state = {
+        name: (Fraction(0),) * 3 if name.bold else Fraction(1) for name in spring.names
+    }  # both points at one place
     assert spring.certify(state, FORCE, WRONG) is None
 
 
-@pytest.mark.parametrize("formula", [r"\frac{1}{l_0} \mathbf{d}_1", r"\frac{k}{k - k} \mathbf{d}_1", r"\mathbf{d}_0"])
+@pytest.mark.parametrize("formula", [r"\frac{k}{k - k} \mathbf{d}_1", r"(l_1^2 - l_1 l_1)^{-1} \mathbf{d}_1"])
 def test_a_side_that_has_a_value_nowhere_is_refuted(spring: Court, formula: str) -> None:
     assert spring.judge(FORCE, read_formula(formula)).verdict is Verdict.REFUTED
 
@@ -316,9 +316,15 @@ def test_a_wrong_energy_or_angle_is_the_only_finding(
 
 
 def test_a_wrong_shared_definition_explains_what_follows_from_it(source: Source) -> None:
-    record = proved(section_of(changed(source, "1", r"\|\mathbf{x}_i - \mathbf{x}_0\|", r"2 \|\mathbf{x}_i - \mathbf{x}_0\|"), "Stretch"))
+    record = proved(
+        section_of(
+            changed(source, "1", r"\|\mathbf{x}_i - \mathbf{x}_0\|", r"2 \|\mathbf{x}_i - \mathbf{x}_0\|"), "Stretch"
+        )
+    )
     assert findings(record) == {"1", "8"}
-    assert [c["change"] for c in claims(record, "1")] == [r"extra factor: 2 \|\mathbf{x}_i - \mathbf{x}_0\| should be \|\mathbf{x}_i - \mathbf{x}_0\|"]
+    assert [c["change"] for c in claims(record, "1")] == [
+        r"extra factor: 2 \|\mathbf{x}_i - \mathbf{x}_0\| should be \|\mathbf{x}_i - \mathbf{x}_0\|"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -359,7 +365,9 @@ def test_an_undefined_symbol_costs_no_other_verdict(
 def test_a_block_that_the_list_lacks_is_reported_and_derived(
     source: Source, declarations: Declarations, title: str, equation: str, blocks: set[str]
 ) -> None:
-    display = next(d for d in re.findall(r"\$\$.*?\$\$", source.text, re.DOTALL) if d.endswith(rf"\quad ({equation})$$"))
+    display = next(
+        d for d in re.findall(r"\$\$.*?\$\$", source.text, re.DOTALL) if d.endswith(rf"\quad ({equation})$$")
+    )
     text = section_of(source.text.replace(display, ""), title)
     (part,) = proved(text)["completeness"]
     assert part["verdict"] == "refuted"
@@ -379,7 +387,6 @@ def test_a_block_that_is_zero_need_not_be_listed(source: Source) -> None:
 
 # -- other documents --------------------------------------------------------------------------------------------------
 
-LOWER = r"\mathbf{e} = \mathbf{x}_1 - \mathbf{x}_0"
 ROD = r"""
 # Discrete rod
 
@@ -436,9 +443,13 @@ $$\frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial \mathbf{x}_1} = -b \left( \
 )
 def test_other_models_are_judged_by_their_own_energy(text: str, old: str, new: str, wrong: set[str]) -> None:
     assert old in text
-    found = verdicts(alone(text.replace(old, new, 1) if old else text))
-    assert {number for number, verdict in found.items() if verdict != {"proved"}} == wrong
-    assert all(found[number] == {"refuted"} for number in wrong)
+    document = read_with(Source("made.md", text.replace(old, new, 1) if old else text), Declarations())
+    found: dict[str, set[str]] = {}
+    for judged in try_document(document, Declarations()).judged:
+        found.setdefault(judged.claim.relation.equation, set()).add(judged.finding.verdict)
+    assert {number: verdict for number, verdict in found.items() if verdict != {"proved"}} == {
+        n: {"refuted"} for n in wrong
+    }
 
 
 def test_a_wrong_line_of_another_model_is_mended(spring: Court) -> None:
@@ -462,6 +473,6 @@ def test_progress_is_told_for_each_judged_claim(source: Source, declarations: De
 def test_a_court_reaches_for_symbols_that_it_does_not_hold(spring: Court) -> None:
     section: Section = spring.section
     assert spring.reaching([read_formula("l_1 + k")]) is spring
-    larger = spring.reaching([read_formula("l_2")])
+    larger = spring.reaching([read_formula(r"\mathbf{x}_2")])
     assert larger is not spring and larger.section is section
     assert Name("x", "2", bold=True) in larger.names

@@ -64,7 +64,6 @@ GOOD = {
     r"a^{12}": A**12,
     r"a^{-2}": A**-2,
     r"a^{+2}": A**2,
-    r"a^2^3": (A**2) ** 3,
     r"\mathbf{x}_1^T": X.T,
     r"\mathbf{x}_1^{T}": X.T,
     r"\mathbf{x}_1^\top": X.T,
@@ -137,7 +136,7 @@ BAD = [
     ("F", 1, "F names no unknown"),
     ("2 F_1", 3, "F_1 names no unknown"),
     (r"\mathbf{F}_i", 1, "F_i names no unknown"),
-    (r"\mathbf{1}", 9, r"zero vector \mathbf{0}"),
+    (r"\mathbf{1}", 1, r"zero vector \mathbf{0}"),
     (r"\frac{\partial V}{\partial V}", 28, "taken by an unknown"),
     (r"\frac{\partial V}{\partial 2}", 28, "unexpected '2'"),
     (r"x_{F_{u_1}}", 4, "cannot be a subscript"),
@@ -173,7 +172,7 @@ def test_a_bar_without_its_partner_is_named(text: str, column: int) -> None:
 
 
 def test_a_bar_where_no_bar_can_stand_is_not_called_unpaired() -> None:
-    with pytest.raises(InputError, match="^f:1:6: ") as error:
+    with pytest.raises(InputError, match=r"^f:1:6: ") as error:
         read_formula(r"\sin |a|", "f")
     assert "not paired" not in str(error.value)
 
@@ -181,7 +180,7 @@ def test_a_bar_where_no_bar_can_stand_is_not_called_unpaired() -> None:
 @pytest.mark.parametrize("text", [r"\sin 2 a", r"\cos 2 \theta", r"\sin 2(a + b)"])
 def test_a_function_of_a_number_times_more_is_refused_as_ambiguous(text: str) -> None:
     """Every reader of `sin 2 a` takes it for sin(2 a); (sin 2) a would be a silent misreading."""
-    with pytest.raises(InputError, match="^f:1:"):
+    with pytest.raises(InputError, match=r"^f:1:"):
         read_formula(text, "f")
 
 
@@ -189,7 +188,7 @@ def test_a_function_of_a_number_times_more_is_refused_as_ambiguous(text: str) ->
     "text", ["(" * 2000 + "a" + ")" * 2000, "-(" * 2000 + "a" + ")" * 2000, "9" * 5000, "a^{" + "9" * 5000 + "}"]
 )
 def test_absurd_sizes_are_refused_in_one_line(text: str) -> None:
-    with pytest.raises(InputError, match="^f:1:") as error:
+    with pytest.raises(InputError, match=r"^f:1:") as error:
         read_formula(text, "f")
     assert "\n" not in str(error.value) and len(str(error.value)) < 300
 
@@ -232,7 +231,8 @@ def shown(relation: Heading | Relation) -> str:
         (r"$$a = b = -c \quad (7)$$", ["(7) a = b = -c"]),
         (r"$$a = b, \quad c = d \quad (7)$$", ["(7) a = b", "(7) c = d"]),
         (r"we assume $a > b \ge c$ here", ["(line 1) a > b >= c"]),
-        (r"$a \le b$, $a \leq b$, $a \lt b$, $a \gt b$, $a \geq b$", [f"(line 1) a {o} b" for o in ("<=", "<=", "<", ">", ">=")]),
+        (r"$a \le b$, $a \leq b$, $a \lt b$", ["(line 1) a <= b", "(line 1) a <= b", "(line 1) a < b"]),
+        (r"$a \ge b$, $a \geq b$, $a \gt b$", ["(line 1) a >= b", "(line 1) a >= b", "(line 1) a > b"]),
         (r"the segment $[\mathbf{q}_0, \mathbf{q}_1]$ and $a, b$ and $a$", []),
         (r"prose with \mathbf{q}_0 and \frac outside, and \$5", []),
     ],
@@ -242,7 +242,9 @@ def test_relations_of_a_text(text: str, expected: list[str]) -> None:
 
 
 def test_headings_in_markdown_and_numbered() -> None:
-    text = "# Title #\n\n## Stretch\n\nprose\n\n2 Bending\n\n2.1 Forces\n\n3. Shear\n\n4 apples are not a heading\n\n#no\n"
+    text = (
+        "# Title #\n\n## Stretch\n\nprose\n\n2 Bending\n\n2.1 Forces\n\n3. Shear\n\n4 apples are not a heading\n\n#no\n"
+    )
     found = [(item.level, item.title) for item in items(text) if isinstance(item, Heading)]
     assert found == [(1, "Title"), (2, "Stretch"), (2, "Bending"), (3, "Forces"), (2, "Shear")]
 
@@ -314,7 +316,9 @@ def test_file_is_refused(tmp_path: Path, data: bytes, place: str, words: str) ->
         load(path)
 
 
-@pytest.mark.parametrize(("name", "words"), [("none.md", "no such file"), ("", "is a directory"), ("x" * 300, "too long")])
+@pytest.mark.parametrize(
+    ("name", "words"), [("none.md", "no such file"), ("", "is a directory"), ("x" * 300, "too long")]
+)
 def test_what_is_no_file_is_refused(tmp_path: Path, name: str, words: str) -> None:
     with pytest.raises(InputError, match=rf":1:1: cannot read the document: .*{words}"):
         load(tmp_path / name)
@@ -332,7 +336,7 @@ def test_line_endings_and_byte_order_mark_leave_places_alone(tmp_path: Path, mar
     assert next(found) == Heading(1, "Té", 0)
     relation = next(found)
     assert isinstance(relation, Relation) and source.place(relation.offset) == (3, 1)
-    with pytest.raises(InputError, match=rf":6:6: unknown LaTeX command \\foo"):
+    with pytest.raises(InputError, match=r":6:6: unknown LaTeX command \\foo"):
         next(found)
 
 

@@ -22,7 +22,9 @@ subscripts = st.one_of(st.just(""), index, st.lists(index, min_size=2, max_size=
 prefixes = st.lists(st.sampled_from(["Delta", *ACCENTS]), max_size=2)
 
 
-def named(bases: st.SearchStrategy[str], subs: st.SearchStrategy[str], bold: st.SearchStrategy[bool]) -> st.SearchStrategy[Name]:
+def named(
+    bases: st.SearchStrategy[str], subs: st.SearchStrategy[str], bold: st.SearchStrategy[bool]
+) -> st.SearchStrategy[Name]:
     return st.builds(lambda p, b, s, f: Name(" ".join([*p, b]), s, f), prefixes, bases, subs, bold)
 
 
@@ -74,8 +76,12 @@ def test_a_name_is_read_back_from_its_latex(name: Name) -> None:
 A, B = symbol("a"), symbol("b", "1")
 
 
-@pytest.mark.parametrize("outer", ["neg", "transpose", "norm", "abs", "sqrt", "pow", "call", "add", "mul", "frac", "cross", "dot"])
-@pytest.mark.parametrize("inner", ["neg", "transpose", "norm", "abs", "sqrt", "pow", "call", "add", "mul", "frac", "cross", "dot"])
+@pytest.mark.parametrize(
+    "outer", ["neg", "transpose", "norm", "abs", "sqrt", "pow", "call", "add", "mul", "frac", "cross", "dot"]
+)
+@pytest.mark.parametrize(
+    "inner", ["neg", "transpose", "norm", "abs", "sqrt", "pow", "call", "add", "mul", "frac", "cross", "dot"]
+)
 def test_every_operation_in_every_place_of_every_other(outer: str, inner: str) -> None:
     def made(op: str, first: Expr, last: Expr) -> Expr:
         value: Any = {"pow": -12, "call": "sin"}.get(op)
@@ -98,7 +104,7 @@ def test_every_operation_in_every_place_of_every_other(outer: str, inner: str) -
         Expr("call", (A,), "sin") * number(2) * A,
         number(2) * number(3) ** 2,
         symbol("k", "theta"),
-        -(-A) - (-B),
+        Expr("neg", (-A,)) - (-B),
     ],
     ids=latex,
 )

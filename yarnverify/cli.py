@@ -6,17 +6,21 @@ could not run. Heavy imports happen inside the commands, so that ``--help`` answ
 
 from __future__ import annotations
 
+import io
 import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import cyclopts
 from cyclopts import App, Parameter
 
 from yarnverify import __version__
+
+if TYPE_CHECKING:
+    from yarnverify.generation import Outcome
 
 app = App(
     name="yarnverify",
@@ -30,9 +34,40 @@ Derivations = Annotated[
 ]
 
 
+Json = Annotated[
+    Path | None,
+    Parameter(
+        name="--json", allow_leading_hyphen=True, help="Write the data behind the output here; - for standard output."
+    ),
+]
+
+
 def _stop(message: str, status: int = 2) -> NoReturn:
     print(message, file=sys.stderr)
     sys.exit(status)
+
+
+def _json(record: Any, target: Path | None) -> bool:
+    """Write a record where it was asked for; whether that was standard output, which then holds nothing else."""
+    if target is None:
+        return False
+    if str(target) == "-":
+        print(json.dumps(record, indent=2))  # ASCII: any terminal and any pipe takes it
+        return True
+    try:
+        target.write_text(json.dumps(record, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    except OSError as error:
+        _stop(f"{target}: cannot write: {(error.strerror or str(error)).lower()}")
+    return False
+
+
+def _finish(outcome: Outcome, target: Path | None) -> None:
+    """Tell what a command did that writes or compares files, and end with its exit status."""
+    shown = sys.stderr if _json(outcome.record, target) else sys.stdout
+    for line in outcome.lines:
+        print(line, file=shown)
+    if outcome.differs:
+        sys.exit(1)
 
 
 @contextmanager
@@ -56,23 +91,13 @@ def progress(what: str) -> Iterator[Callable[[str, int], None]]:
         yield lambda label, total: bar.update(task, advance=1, total=total, label=label)
 
 
-def _record(document: Path | None, derivations: str | None, cache: bool) -> tuple[dict[str, Any], str]:
-    """The record of a document with its errata settled, and a line on how long it took."""
-    from yarnverify.verdicts import verdicts
-
-    with progress("proving") as advance:
-        return verdicts(document, derivations, cache, advance)
-
-
 @app.command
 def prove(
     document: Path | None = None,
     /,
     *,
     derivations: Derivations = None,
-    json_file: Annotated[
-        Path | None, Parameter(name="--json", help="Write the record here; - for standard output.")
-    ] = None,
+    json_file: Json = None,
     cache: Annotated[bool, Parameter(help="Use and keep results that are already known.")] = True,
 ) -> None:
     """A verdict on every printed equation.
@@ -83,13 +108,11 @@ def prove(
         Markdown or text with numbered formulas; the paper's document by default.
     """
     from yarnverify.show import show_verdicts
+    from yarnverify.verdicts import verdicts
 
-    record, took = _record(document, derivations, cache)
-    if json_file is not None and str(json_file) == "-":
-        print(json.dumps(record, indent=2, ensure_ascii=False))
-    else:
-        if json_file is not None:
-            _write(json_file, json.dumps(record, indent=2, ensure_ascii=False) + "\n")
+    with progress("proving") as advance:
+        record, took = verdicts(document, derivations, cache, advance)
+    if not _json(record, json_file):
         show_verdicts(record, took)
     if not record["as_expected"]:
         sys.exit(1)
@@ -102,9 +125,7 @@ def derive(
     *,
     format: Literal["text", "latex", "markdown"] = "text",
     derivations: Annotated[Path | None, Parameter(help="Folder of declared energies.")] = None,
-    json_file: Annotated[
-        Path | None, Parameter(name="--json", help="Write the derivation as JSON; - for standard output.")
-    ] = None,
+    json_file: Json = None,
 ) -> None:
     """The derivation of an energy: measures, their derivatives, the chain rule, the result.
 
@@ -116,35 +137,22 @@ def derive(
     from yarnverify.symbolic.explain import explain, explanation
 
     record = explanation(energy, derivations)
-    if json_file is not None:
-        text = json.dumps(record, indent=2, ensure_ascii=False) + "\n"
-        if str(json_file) == "-":
-            sys.stdout.write(text)
-            return
-        _write(json_file, text)
-    print(explain(record, format))
+    if not _json(record, json_file):
+        print(explain(record, format))
 
 
 @app.command
 def generate(
     *,
     check: Annotated[bool, Parameter(negative="", help="Compare with the files instead of writing them.")] = False,
-    json_file: Annotated[
-        Path | None, Parameter(name="--json", help="Write names and operation counts; - for standard output.")
-    ] = None,
+    json_file: Json = None,
 ) -> None:
     """The kernels, from the derivations."""
     from yarnverify.generation import generate_kernels
 
     with progress("generating") as advance:
         outcome = generate_kernels(check, advance)
-    if json_file is not None:
-        text = json.dumps(outcome.record, indent=2) + "\n"
-        sys.stdout.write(text) if str(json_file) == "-" else _write(json_file, text)
-    for line in outcome.lines:
-        print(line, file=sys.stderr if str(json_file) == "-" else sys.stdout)
-    if outcome.differs:
-        sys.exit(1)
+    _finish(outcome, json_file)
 
 
 @app.command
@@ -152,35 +160,25 @@ def report(
     *,
     out: Annotated[Path, Parameter(help="Folder for the pages and the records behind them.")] = Path("reports"),
     check: Annotated[bool, Parameter(negative="", help="Compare with the files instead of writing them.")] = False,
-    json_file: Annotated[Path | None, Parameter(name="--json", help="Write the tally; - for standard output.")] = None,
+    json_file: Json = None,
 ) -> None:
     """All of it, to reports/: verdicts, corrections, derivations and kernels, a page an energy."""
     from yarnverify.reporting import build_report
 
     with progress("reporting") as advance:
         outcome = build_report(out, check, advance)
-    if json_file is not None:
-        text = json.dumps(outcome.record, indent=2) + "\n"
-        sys.stdout.write(text) if str(json_file) == "-" else _write(json_file, text)
-    for line in outcome.lines:
-        print(line, file=sys.stderr if str(json_file) == "-" else sys.stdout)
-    if outcome.differs:
-        sys.exit(1)
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        _stop(f"{path}: cannot write: {(error.strerror or str(error)).lower()}")
+    _finish(outcome, json_file)
 
 
 def main() -> None:
     """Run the command line; bad input is one line on standard error and exit status 2."""
     from yarnverify.errors import InputError, NotRunError
 
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a terminal without Greek letters still gets the result
     try:
-        app(error_formatter=lambda error: f"yarnverify: {error}", exit_on_error=False, print_error=False)
+        app(sys.argv[1:], error_formatter=lambda error: f"yarnverify: {error}", exit_on_error=False, print_error=False)
     except cyclopts.CycloptsError as error:
         _stop(f"yarnverify: {' '.join(str(error).split())}")
     except InputError as error:
@@ -190,5 +188,3 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)
-    except KeyboardInterrupt:
-        _stop("interrupted", 130)

@@ -19,7 +19,8 @@ from yarnverify.errors import InputError
 
 MAIN_DOCUMENT = "cirio2014.md"
 _DISPLAY = re.compile(r"\$\$(.*?)\$\$", re.DOTALL)
-_NUMBER = re.compile(r"(\\tag\{[^}]*\}|\(\d+[a-z]?\))\s*$|\\quad|\s+")
+_SPACE = re.compile(r"\\(?:quad|qquad|thinspace)(?![A-Za-z])|\\[,;:! ]|~|\s+")
+_NUMBER = re.compile(r"(?:\\tag\{[^}]*\}|\(\d+[a-z]?\))[.,;]*$")
 _DECLARES = re.compile(r"""document\s*=\s*["']([^"']+)["']""")
 
 
@@ -52,7 +53,7 @@ def derivations() -> Path:
 
 
 def _displays(text: str) -> set[str]:
-    return {_NUMBER.sub("", _NUMBER.sub("", found)) for found in _DISPLAY.findall(text)}
+    return {_NUMBER.sub("", _SPACE.sub("", found)).rstrip(".,;") for found in _DISPLAY.findall(text)}
 
 
 def shelf_for(document: Path, text: str, choice: str | None = None) -> Shelf:
@@ -69,27 +70,37 @@ def shelf_for(document: Path, text: str, choice: str | None = None) -> Shelf:
     """
     if choice == "none":
         return Shelf(None, document.name, "by itself alone")
-    folders = [Path(choice)] if choice else [document.parent, derivations()]
-    for folder in folders:
+    if choice is not None:
+        folder = Path(choice)
         names = _declared_documents(folder)
-        if document.name in names and (choice or folder.resolve() == document.resolve().parent):
-            return Shelf(folder, document.name, f"by the energies declared in {folder}")
-    mine = _displays(text)
-    for folder in folders[-1:]:
-        for name in sorted(_declared_documents(folder)):
-            other = folder / name
-            if not other.is_file():
-                continue
-            common = len(mine & _displays(other.read_text(encoding="utf-8")))
-            if choice or 2 * common >= len(mine) > 0:
-                return Shelf(
-                    folder, name, f"by the energies declared for {name}, with which it shares {common} displays"
-                )
+        if not names:
+            what = "declares no energies of a document" if folder.is_dir() else "is no folder"
+            raise InputError(f"{folder}: {what}; give a folder of derivations, or none")
+        name = document.name if document.name in names else _nearest(folder, names, text)[1]
+        return Shelf(folder, name, f"by the energies declared for {name} in {folder}")
+    if document.name in _declared_documents(document.parent):
+        return Shelf(document.parent, document.name, f"by the energies declared in {document.parent}")
+    common, name = _nearest(derivations(), _declared_documents(derivations()), text)
+    if 2 * common >= len(_displays(text)) > 0:
+        return Shelf(
+            derivations(), name, f"by the energies declared for {name}, with which it shares {common} displays"
+        )
     return Shelf(None, document.name, "by itself alone: no declared energies belong to it")
 
 
+def _nearest(folder: Path, names: set[str], text: str) -> tuple[int, str]:
+    """The document among some that shares most displays with a text, and how many."""
+    mine = _displays(text)
+    shared = [(len(mine & _displays(_text(folder / name))), name) for name in sorted(names)]
+    return max(shared, key=lambda item: item[0])
+
+
+def _text(path: Path) -> str:
+    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+
+
 def _declared_documents(folder: Path) -> set[str]:
-    return {name for path in folder.glob("*.py") for name in _DECLARES.findall(path.read_text(encoding="utf-8"))}
+    return {name for path in folder.glob("*.py") for name in _DECLARES.findall(_text(path))}
 
 
 def errata(shelf: Shelf) -> tuple[Erratum, ...]:
@@ -107,6 +118,8 @@ def errata(shelf: Shelf) -> tuple[Erratum, ...]:
         return ()
     try:
         entries = tomllib.loads(path.read_text(encoding="utf-8")).get("erratum", [])
+        if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+            raise InputError(f"{path}: errata are tables, each under a line [[erratum]]")
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: {error}") from None
     found = []
@@ -141,12 +154,13 @@ def _cache() -> Path:
     return Path(base) / "yarnverify"
 
 
-def recall(key: str) -> Any | None:
-    """A result stored under a fingerprint, or None."""
+def recall(key: str) -> dict[str, Any] | None:
+    """A record stored under a fingerprint, or None."""
     try:
-        return json.loads((_cache() / f"{key}.json").read_text(encoding="utf-8"))
+        record = json.loads((_cache() / f"{key}.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
+    return record if isinstance(record, dict) and "claims" in record else None
 
 
 def remember(key: str, record: Any) -> None:

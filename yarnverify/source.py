@@ -47,14 +47,19 @@ def load(path: Path) -> Source:
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"cannot read the document: {(error.strerror or str(error)).lower()}", (name, 1, 1)) from None
+    data = data.removeprefix(b"\xef\xbb\xbf")  # byte order mark
     try:
-        text = data.decode("utf-8-sig")
+        text = data.decode("utf-8")
     except UnicodeDecodeError as error:
-        good = data[: error.start].decode("utf-8-sig")
+        good = _one_line_end(data[: error.start].decode("utf-8"))
         Source(name, good).fail(len(good), f"not a text file: byte 0x{data[error.start]:02x} is not UTF-8")
-    source = Source(name, text.replace("\r\n", "\n").replace("\r", "\n"))
+    source = Source(name, _one_line_end(text))
     if "\0" in text:
         source.fail(source.text.index("\0"), "not a text file: it holds a zero byte")
     if not text.strip():
         source.fail(0, "the document is empty")
     return source
+
+
+def _one_line_end(text: str) -> str:
+    return text.replace("\r\n", "\n").replace("\r", "\n")

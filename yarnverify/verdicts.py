@@ -74,9 +74,14 @@ def settle(record: dict[str, Any], shelf: Shelf, accepted: tuple[Erratum, ...]) 
     """Mark what the errata accept; add what is new, what is stale, and whether all is as expected."""
     used: set[Erratum] = set()
     new: list[str] = []
+    known = {(erratum.equation, erratum.change) for erratum in accepted}
+    mended = {c["equation"] for c in record["claims"] if (c["equation"], c["change"]) in known}
     for claim in record["claims"]:
         claim["erratum"] = None
         if claim["verdict"] == "proved":
+            continue
+        if claim["because"] and set(claim["because"]) <= mended:
+            claim["erratum"] = "follows from accepted errata"
             continue
         match = [e for e in accepted if e.equation == claim["equation"] and e.change == claim["change"]]
         if claim["verdict"] == "refuted" and match:

@@ -24,7 +24,7 @@ from typing import Any, Literal, get_type_hints
 from yarnverify.errors import InputError
 from yarnverify.source import Source
 from yarnverify.symbolic.reader import parse
-from yarnverify.symbolic.tree import PI, Expr, Name
+from yarnverify.symbolic.tree import PI, Expr, Name, ShapeError, Type, as_expr, type_of
 
 
 class Point:
@@ -195,6 +195,13 @@ def assumptions(members: Iterable[Expr], operators: Iterable[str]) -> tuple[Assu
     return tuple(found)
 
 
+def _parsed(text: str, what: str) -> Any:
+    try:
+        return parse(Source(what, text), 0, len(text))
+    except InputError as error:
+        raise ValueError(str(error)) from None
+
+
 def energy(
     *,
     document: str = "",
@@ -215,12 +222,19 @@ def energy(
         name = function.__name__
         where: list[Assumption] = []
         if domain:
-            for members, operators in parse(Source(f"domain of {name}", domain), 0, len(domain)):
+            for members, operators in _parsed(domain, f"domain of {name}"):
                 where += assumptions(members, operators)
+        expression = as_expr(function(**unknowns, **symbols))
+        try:
+            kind = type_of(expression, lambda symbol: Type.VECTOR if symbol.bold else Type.SCALAR)
+        except ShapeError as error:
+            raise TypeError(f"{name}: {error.message}") from None
+        if kind is not Type.SCALAR:
+            raise TypeError(f"{name}: an energy is a scalar, and this is a {kind.value}")
         return Energy(
             name, document, section, unit, inspect.getdoc(function) or "",
             tuple(node.name for node in unknowns.values()), tuple(parameters.values()),
-            function(**unknowns, **symbols), tuple(where), removable, singular, rest or {}, elsewhere,
+            expression, tuple(where), removable, singular, rest or {}, elsewhere,
         )  # fmt: skip
 
     return declare
@@ -233,7 +247,10 @@ def quantity(
 
     def declare(function: Callable[..., Expr]) -> Quantity:
         hints = get_type_hints(function)
-        ((members, _),) = parse(Source(f"symbol of {function.__name__}", symbol), 0, len(symbol))
+        relations = _parsed(symbol, f"symbol of {function.__name__}")
+        members, operators = relations[0]
+        if len(relations) > 1 or operators or members[0].op != "symbol":
+            raise ValueError(f"symbol of {function.__name__} must be one symbol, not {symbol!r}")
         return Quantity(members[0].name, document, section, unit, function(**_unknowns(function, hints)), function)
 
     return declare
@@ -257,12 +274,10 @@ def load_declarations(folder: Path) -> Declarations:
     """
     energies: dict[str, Energy] = {}
     quantities: list[Quantity] = []
-    for path in sorted(folder.glob("*.py")):
+    for path in sorted(path for path in folder.glob("*.py") if path.is_file()):
         namespace: dict[str, Any] = {"__name__": path.stem, "__file__": str(path)}
         try:
-            exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), namespace)
-        except InputError:
-            raise
+            exec(compile(path.read_bytes(), str(path), "exec"), namespace)
         except SyntaxError as error:
             raise InputError(error.msg, (str(path), error.lineno or 1, error.offset or 1)) from None
         except Exception as error:
@@ -272,7 +287,7 @@ def load_declarations(folder: Path) -> Declarations:
             raise InputError(f"{type(error).__name__}: {error}", place) from None
         for value in namespace.values():
             if isinstance(value, Energy):
-                if value.name in energies:
+                if energies.get(value.name, value) is not value:
                     raise InputError(f"energy {value.name!r} is declared twice", (str(path), 1, 1))
                 energies[value.name] = value
             elif isinstance(value, Quantity):

@@ -6,7 +6,7 @@ A chain ``A = B = -C`` is several claims: every member but the last is claimed t
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from yarnverify.source import Source
@@ -15,6 +15,7 @@ from yarnverify.symbolic.latex import latex, name_latex
 from yarnverify.symbolic.reader import Heading, Relation, read
 from yarnverify.symbolic.tree import Expr, Name, ShapeError, Type, rebuild, type_of
 
+_DEEPEST = 50  # definitions inside definitions
 _INDEX = re.compile(r"(?:\d+|[a-z]|[a-z][+-]\d+)\Z")
 
 
@@ -53,6 +54,8 @@ class Section:
     parameters: tuple[Name, ...] = ()
     unknowns: tuple[Name, ...] = ()
     declared: Energy | None = None
+    _meanings: dict[Name, Expr | None] = field(default_factory=dict, repr=False, compare=False)
+    _shapes: dict[Name, Type] = field(default_factory=dict, repr=False, compare=False)
     families: set[tuple[str, bool]] = field(default_factory=lambda: {("x", True), ("u", False), ("v", False)})
 
     def definition(self, name: Name) -> Definition | None:
@@ -69,6 +72,16 @@ class Section:
 
     def meaning(self, name: Name) -> Expr | None:
         """The tree that a defined symbol stands for, its running index filled in; None where nothing defines it."""
+        if name not in self._meanings:
+            self._meanings[name] = self._meaning(name)
+        return self._meanings[name]
+
+    def forget(self) -> None:
+        """To be called when definitions, parameters or families have changed: what was looked up may be out of date."""
+        self._meanings.clear()
+        self._shapes.clear()
+
+    def _meaning(self, name: Name) -> Expr | None:
         found = self.definition(name)
         if found is None:
             return None
@@ -80,12 +93,18 @@ class Section:
         """Whether a symbol is a degree of freedom of some crossing: x_1, u_0, v_3, and families like them."""
         return (name.base, name.bold) in self.families and bool(_INDEX.match(name.sub))
 
+    def _enter(self, name: Name, inside: tuple[Name, ...], at: Expr) -> tuple[Name, ...]:
+        """The definitions being followed, with one more; a circle, also through shifted indices, is an error."""
+        if name in inside or len(inside) > _DEEPEST:
+            raise ShapeError(at, f"{name_latex(name)} is defined by itself")
+        return (*inside, name)
+
     def undefined(self, expr: Expr) -> list[Name]:
         """Symbols under a tree that nothing defines, followed through definitions, in printed order."""
         found: dict[Name, None] = {}
         seen: set[Name] = set()
 
-        def visit(node: Expr) -> None:
+        def visit(node: Expr, inside: tuple[Name, ...] = ()) -> None:
             for part in node.walk():
                 if part.op == "derivative" and not self.is_unknown(part.name):
                     found.setdefault(part.name)
@@ -96,20 +115,24 @@ class Section:
                 seen.add(part.name)
                 meaning = self.meaning(part.name)
                 if meaning is not None:
-                    visit(meaning)
+                    visit(meaning, self._enter(part.name, inside, part))
                 elif not self.is_unknown(part.name) and part.name not in self.parameters:
                     found.setdefault(part.name)
 
         visit(expr)
         return list(found)
 
-    def lookup(self, name: Name, _open: tuple[Name, ...] = ()) -> Type:
+    def lookup(self, name: Name, inside: tuple[Name, ...] = ()) -> Type:
         """Shape of a symbol."""
+        if name not in self._shapes:
+            self._shapes[name] = self._shape(name, inside)
+        return self._shapes[name]
+
+    def _shape(self, name: Name, inside: tuple[Name, ...]) -> Type:
         meaning = self.meaning(name)
         if meaning is not None:
-            if name in _open:
-                raise ShapeError(meaning, f"{name_latex(name)} is defined by itself")
-            return type_of(meaning, lambda inner: self.lookup(inner, (*_open, name)))
+            followed = self._enter(name, inside, meaning)
+            return type_of(meaning, lambda inner: self.lookup(inner, followed))
         if self.is_unknown(name):
             return Type.VECTOR if name.bold else Type.SCALAR
         if name in self.parameters:
@@ -119,12 +142,12 @@ class Section:
     def type_of(self, expr: Expr) -> Type:
         return type_of(expr, self.lookup)
 
-    def expand(self, expr: Expr) -> Expr:
+    def expand(self, expr: Expr, inside: tuple[Name, ...] = ()) -> Expr:
         """A tree with every defined symbol replaced by what it stands for."""
 
         def change(node: Expr) -> Expr | None:
             meaning = self.meaning(node.name) if node.op == "symbol" else None
-            return None if meaning is None else self.expand(meaning)
+            return None if meaning is None else self.expand(meaning, self._enter(node.name, inside, node))
 
         return rebuild(expr, change)
 
@@ -201,11 +224,23 @@ def _states_mechanics(expr: Expr) -> bool:
     return any(node.op in {"force", "energy", "derivative"} for node in expr.walk())
 
 
+def _has_energy(items: list[Heading | Relation], heading: Heading) -> bool:
+    """Whether an energy stands between a heading and the next one."""
+    for item in items[items.index(heading) + 1 :]:
+        if isinstance(item, Heading):
+            return False
+        if item.members[0].op == "energy":
+            return True
+    return False
+
+
 def _sections(source: Source, items: list[Heading | Relation]) -> tuple[Section, list[tuple[Section, list[Relation]]]]:
     """Group relations under headings: a lone top heading is the title, deeper headings belong to the section above."""
     headings = [item for item in items if isinstance(item, Heading)]
     titles = [h for h in headings if h.level == headings[0].level]
-    has_title = len(titles) == 1 and any(h.level > titles[0].level for h in headings)
+    has_title = (
+        len(titles) == 1 and any(h.level > titles[0].level for h in headings) and not _has_energy(items, titles[0])
+    )
     rest = [h for h in headings if not (has_title and h is titles[0])]
     level = min((h.level for h in rest), default=0)
     shared = Section("", 0)
@@ -233,6 +268,13 @@ def read_document(source: Source, declare: Callable[[Section], Energy | None] = 
     InputError
         For anything that cannot be read, wrong shapes, circular definitions, and sections without an energy.
     """
+    try:
+        return _read_document(source, declare)
+    except ShapeError as error:  # definitions that go in a circle
+        source.fail(error.span[0], error.message)
+
+
+def _read_document(source: Source, declare: Callable[[Section], Energy | None]) -> Document:
     items = list(read(source))
     shared, groups = _sections(source, items)
     relations = tuple(item for item in items if isinstance(item, Relation))
@@ -273,32 +315,44 @@ def _definitions(section: Section, own: Iterable[Relation]) -> list[Relation]:
     left = []
     for relation in own:
         section.assumptions += assumptions(relation.members, relation.operators)
-        count = next((i for i, op in enumerate(relation.operators) if op != "="), len(relation.operators))
-        if count == 0:
-            continue
-        equal = replace(relation, members=relation.members[: count + 1], operators=relation.operators[:count])
-        first, second = equal.members[:2]
-        if first.op == "energy" and section.energy is None and section.title != "":
-            section.energy = Definition(first.name, second, equal)
-        elif (
-            first.op == "symbol"
-            and section.definition(first.name) is None
-            and not (section.is_unknown(first.name) and first.name.sub.isdigit())
-            and not any(_states_mechanics(member) for member in equal.members)
-        ):
-            index = _running_index(first.name, second)
-            section.definitions[first.name] = Definition(first.name, second, equal, index)
-        else:
-            left.append(equal)
-            continue
-        if count > 1:
-            left.append(replace(equal, members=equal.members[1:], operators=equal.operators[1:], offset=second.span[0]))
+        for equal in _equalities(relation):
+            first, second = equal.members[:2]
+            if first.op == "energy" and section.energy is None and section.title != "":
+                section.energy = Definition(first.name, second, equal)
+            elif (
+                first.op == "symbol"
+                and section.definition(first.name) is None
+                and not (section.is_unknown(first.name) and first.name.sub.isdigit())
+                and not any(_states_mechanics(member) for member in equal.members)
+            ):
+                index = _running_index(first.name, second)
+                section.definitions[first.name] = Definition(first.name, second, equal, index)
+                section.forget()
+            else:
+                left.append(equal)
+                continue
+            if len(equal.operators) > 1:
+                rest = replace(equal, members=equal.members[1:], operators=equal.operators[1:], offset=second.span[0])
+                left.append(rest)
     return left
+
+
+def _equalities(relation: Relation) -> Iterator[Relation]:
+    """The longest pieces of a chain that are joined by equality signs alone."""
+    start = 0
+    for end, operator in enumerate((*relation.operators, ">")):
+        if operator != "=":
+            if end > start:
+                members, operators = relation.members[start : end + 1], relation.operators[start:end]
+                offset = members[0].span[0] if start else relation.offset
+                yield replace(relation, members=members, operators=operators, offset=offset)
+            start = end + 1
 
 
 def _unknowns(section: Section, own: Iterable[Relation]) -> None:
     """Settle what the section's unknowns and parameters are: as declared, or as its printed energy has them."""
     assert section.energy is not None
+    section.forget()
     named = {node.name for r in own for m in r.members for node in m.walk() if node.op in {"force", "derivative"}}
     section.families |= {(name.base, name.bold) for name in named if _INDEX.match(name.sub)}
     base = section.base_symbols(section.energy.expression)
@@ -335,9 +389,10 @@ def _check_shapes(document: Document, groups: list[tuple[Section, list[Relation]
                     error.span[0],
                     f"equation ({relation.equation}): {error.message}" if not relation.inline else error.message,
                 )
-            for operator, member, kind in zip(relation.operators, relation.members[1:], kinds[1:], strict=True):
-                if operator != "=" and kind not in (Type.SCALAR, Type.UNKNOWN):
-                    document.source.fail(member.span[0], f"cannot compare a {kind.value} by {operator}")
+            for index, operator in enumerate(relation.operators):
+                for member, kind in zip(relation.members[index : index + 2], kinds[index : index + 2], strict=True):
+                    if operator != "=" and kind not in (Type.SCALAR, Type.UNKNOWN):
+                        document.source.fail(member.span[0], f"cannot compare a {kind.value} by {operator}")
         energy = section.energy
         if energy is not None and section.type_of(energy.expression) not in (Type.SCALAR, Type.UNKNOWN):
             document.source.fail(energy.expression.span[0], "an energy is a scalar")

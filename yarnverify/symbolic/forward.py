@@ -50,6 +50,8 @@ class Algebraic:
         return other if isinstance(other, Algebraic) else Algebraic(self.roots, {0: flint.fmpq(other)})
 
     def __add__(self, other: Number) -> Number:
+        if isinstance(other, np.ndarray):
+            return NotImplemented  # NumPy then works entry by entry
         parts = dict(self.parts)
         for mask, q in self._lift(other).parts.items():
             parts[mask] = parts.get(mask, 0) + q
@@ -67,6 +69,8 @@ class Algebraic:
         return -self + other
 
     def __mul__(self, other: Number) -> Number:
+        if isinstance(other, np.ndarray):
+            return NotImplemented
         total: Number = Algebraic(self.roots, {})
         for m, p in self.parts.items():
             for n, q in self._lift(other).parts.items():

@@ -26,7 +26,8 @@ def name_latex(name: Name) -> str:
         text = f"\\Delta {text}" if prefix == "Delta" else f"\\{prefix}{{{text}}}"
     if not name.sub:
         return text
-    return f"{text}_{name.sub}" if len(name.sub) == 1 else f"{text}_{{{name.sub}}}"
+    sub = ",".join("\\" + item if item in GREEK else item for item in name.sub.split(","))
+    return f"{text}_{sub}" if len(sub) == 1 else f"{text}_{{{sub}}}"
 
 
 def _group(expr: Expr) -> str:
@@ -110,7 +111,7 @@ def latex(expr: Expr) -> str:
             return f"\\frac{{{latex(args[0])}}}{{{latex(args[1])}}}"
         case "pow":
             exponent = f"^{expr.value}" if len(str(expr.value)) == 1 else f"^{{{expr.value}}}"
-            if args[0].op == "call":
+            if args[0].op == "call" and len(str(expr.value)) == 1:  # sin^{-1} would be read as the inverse function
                 return _call(args[0], exponent)
             return _atom(args[0]) + exponent
         case "transpose":

@@ -83,9 +83,9 @@ class Court:
         self.section, self.energy = section, energy
         trees = [energy, *also]
         trees += [side for claim in section.claims for side in (claim.left, claim.right)]
-        trees += [side for a in section.assumptions for side in (a.left, a.right)]
+        assumed = {n for a in section.assumptions for side in (a.left, a.right) for n in section.base_symbols(side)}
         names = {name for tree in trees for name in section.base_symbols(tree)} | set(section.unknowns)
-        names = {n for n in names if section.is_unknown(n) or n in section.parameters}
+        names = {n for n in names if section.is_unknown(n) or n in section.parameters} | assumed
         self.names = sorted(names, key=lambda n: (not n.bold, n.base, n.sub))
         declared = section.declared
         positive = {p.name for p in declared.parameters if p.positive} if declared else set(section.parameters)
@@ -316,6 +316,7 @@ def try_document(
     wrong = [j for j in judged if j.finding.verdict is not Verdict.PROVED]
     for part in (document.shared, *document.sections):
         _stand_in(part, declarations, [j for j in wrong if j.finding.undefined and j.section is part])
+        part.forget()
     for section in document.sections:
         assert section.energy is not None
         truth, blamed = section.energy.expression, [j for j in wrong if j.section in (section, document.shared)]
@@ -374,7 +375,7 @@ def _stand_in(section: Section, declarations: Declarations, broken: Iterable[Jud
 
 def as_declared(section: Section, declarations: Declarations) -> Section:
     """A section with every declared definition in place of its printed one."""
-    copy = replace(section, definitions=dict(section.definitions), claims=[])
+    copy = replace(section, definitions=dict(section.definitions), claims=[], _meanings={}, _shapes={})
     if section.shared is not None:
         copy.shared = as_declared(section.shared, declarations)
     for symbol, definition in section.definitions.items():

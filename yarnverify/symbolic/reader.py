@@ -9,13 +9,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from lark import Lark, Token, Transformer, v_args
-from lark.exceptions import UnexpectedCharacters, UnexpectedToken
+from lark.exceptions import UnexpectedToken
 from lark.tree import Meta
 
 from yarnverify.errors import InputError
@@ -25,6 +26,7 @@ from yarnverify.symbolic.tree import IDENTITY, Expr, Name, number
 EQUATION_NUMBER = re.compile(
     r"(?:\\tag\s*\{\s*(?P<tag>[^{}\s]+)\s*\}|(?<![A-Za-z0-9}_^])\(\s*(?P<number>\d+[a-z]?)\s*\))[\s.,;]*\Z"
 )
+_DEEPEST, _LONGEST_NUMBER, _LONGEST_EXPONENT = 60, 100, 2  # far beyond any formula, and within what Python recurses
 _TRAILING = re.compile(r"(?:[\s.,;~]|\\quad|\\qquad|\\[,;:! ])*\Z")
 _RELATION = re.compile(r"[=<>]|\\(?:le|leq|ge|geq|lt|gt)(?![A-Za-z])")
 _PIECE = re.compile(
@@ -33,7 +35,7 @@ _PIECE = re.compile(
     r"|(?P<inline>\$)"
     r"|^(?P<marks>\#{1,6})[ \t]+(?P<title>[^\n]*?)[ \t\#]*$"
     r"|(?:\A|(?<=\n\n))(?P<count>\d+(?:\.\d+)*)\.?[ \t]+(?P<numbered>[A-Z][^\n.$]{0,80})(?=\n\n|\n?\Z)"
-    r"|(?P<foreign>\\begin\s*\{\w+\*?\}|\\\[)",
+    r"|(?P<foreign>\\begin\s*\{\w+\*?\}|\\[\[(]|^```math\b)",
     re.MULTILINE,
 )
 
@@ -110,6 +112,10 @@ def _display(source: Source, start: int, begin: int, end: int, used: dict[str, i
     used[equation] = start
     relations = parse(source, begin, begin + tag.start())
     for index, (members, operators) in enumerate(relations):
+        if not operators:
+            source.fail(
+                members[0].span[0], f"equation ({equation}) states nothing here: a relation such as ... = ... is wanted"
+            )
         yield Relation(members, operators, equation, members[0].span[0] if index else start, False)
 
 
@@ -124,7 +130,11 @@ def _inline(source: Source, start: int, begin: int, end: int) -> Iterator[Relati
 
 def _check_braces(source: Source, begin: int, end: int) -> None:
     open_at: list[int] = []
-    for match in re.finditer(r"\\.|[{}]", source.text[begin:end], re.DOTALL):
+    depth = 0
+    for match in re.finditer(r"\\.|[{}()\[\]]", source.text[begin:end], re.DOTALL):
+        depth += (match[0] in "{([") - (match[0] in "})]")
+        if depth > _DEEPEST:
+            source.fail(begin + match.start(), f"formula is nested more than {_DEEPEST} deep")
         if match[0] == "{":
             open_at.append(begin + match.start())
         elif match[0] == "}":
@@ -135,34 +145,44 @@ def _check_braces(source: Source, begin: int, end: int) -> None:
         source.fail(open_at[-1], "unbalanced braces: this { is never closed")
 
 
+class _UnpairedError(Exception):
+    def __init__(self, token: Token) -> None:
+        self.token = token
+
+
 class _Bars:
     """Tells an opening bar from a closing one: a bar after something complete, inside bars, closes them."""
 
     always_accept = ("BARS", "BAR", "UNKNOWN_COMMAND", "UNKNOWN_CHARACTER")
-    _PAIRS = MappingProxyType({"BARS": "NORM", "BAR": "ABS"})
+    _PAIRS = MappingProxyType({"BARS": "_NORM", "BAR": "_ABS"})
     _OPENERS = frozenset({"LPAR", "LSQB", "LBRACE", "LEFT_PAREN", "LEFT_BRACKET"})
     _CLOSERS = frozenset({"RPAR", "RSQB", "RBRACE", "RIGHT_PAREN", "RIGHT_BRACKET"})
     _COMPLETE = frozenset({"LETTER", "GREEK", "NUMBER", "PI", "TRANSPOSE", "SUP_DIGIT", "SUB_CHARACTER", "SHORT_FRAC"})
 
     def process(self, stream: Iterator[Token]) -> Iterator[Token]:
-        stack: list[str] = []
+        stack: list[Token] = []  # what is open: plain bars by their own type, explicit ones by that of \left|
         previous = ""
         for token in stream:
-            kind = token.type
-            if kind in self._PAIRS:
-                pair = self._PAIRS[kind]
+            plain = token.type in self._PAIRS
+            if plain:
                 complete = previous in self._COMPLETE | self._CLOSERS or previous.endswith("_CLOSE")
-                closing = complete and bool(stack) and stack[-1] == pair
-                kind = f"_{pair}_CLOSE" if closing else f"_{pair}_OPEN"
+                closing = complete and bool(stack) and stack[-1].type == token.type
+                stack.pop() if closing else stack.append(token)
+                kind = self._PAIRS[token.type] + ("_CLOSE" if closing else "_OPEN")
                 token = Token.new_borrow_pos(kind, token.value, token)
-            if kind in self._OPENERS:
-                stack.append(kind)
-            elif kind.endswith("_OPEN"):
-                stack.append(kind.strip("_").removesuffix("_OPEN"))
-            elif (kind in self._CLOSERS or kind.endswith("_CLOSE")) and stack:
-                stack.pop()
-            previous = kind
+            elif token.type in self._OPENERS or token.type.endswith("_OPEN"):
+                stack.append(token)
+            elif token.type in self._CLOSERS or token.type.endswith("_CLOSE"):
+                bar = stack and (stack[-1].type in self._PAIRS or stack[-1].type.endswith("_OPEN"))
+                if bar and stack[-1].type.replace("_OPEN", "_CLOSE") != token.type:
+                    raise _UnpairedError(stack[-1])
+                if stack:
+                    stack.pop()
+            previous = token.type
             yield token
+        for token in stack:
+            if token.type in self._PAIRS or token.type.endswith("_OPEN"):
+                raise _UnpairedError(token)
 
 
 @v_args(meta=True)
@@ -206,6 +226,8 @@ class _Build(Transformer[Token, Any]):
         sign, digits = items
         if "." in digits:
             self.complain(digits.start_pos + self.shift, "exponents are integers here; write \\sqrt{...} for a root")
+        if len(digits) > _LONGEST_EXPONENT:
+            self.complain(digits.start_pos + self.shift, f"exponents have at most {_LONGEST_EXPONENT} digits here")
         return -int(digits) if sign == "-" else int(digits)
 
     def power(self, meta: Meta, items: list[Any]) -> Expr:
@@ -218,8 +240,8 @@ class _Build(Transformer[Token, Any]):
         return self._node(meta, "transpose", items[0])
 
     def number(self, meta: Meta, items: list[Token]) -> Expr:
-        from fractions import Fraction
-
+        if len(items[0]) > _LONGEST_NUMBER:
+            self.complain(meta.start_pos + self.shift, f"numbers have at most {_LONGEST_NUMBER} digits here")
         exact = number(Fraction(str(items[0])))
         return replace(exact, span=(meta.start_pos + self.shift, meta.end_pos + self.shift))
 
@@ -342,13 +364,12 @@ def parse(source: Source, begin: int, end: int, start: str = "relations") -> Any
         source.fail(begin, "empty formula")
     try:
         tree = _parser().parse(formula, start=start)
+    except _UnpairedError as error:
+        source.fail(begin + (error.token.start_pos or 0), f"{error.token} is not paired with a closing one")
     except UnexpectedToken as error:
         token = error.token
         offset = begin + (len(formula) if token.type == "$END" else (token.start_pos or 0))
         source.fail(offset, _explain(token))
-    except UnexpectedCharacters as error:
-        at = error.pos_in_stream or 0
-        source.fail(begin + at, f"unexpected character {formula[at]!r}")
     builder = _Build(begin, source.fail)
     try:
         return builder.transform(tree)
@@ -366,8 +387,6 @@ def _explain(token: Token) -> str:
     if token.type == "UNKNOWN_CHARACTER":
         hint = "; write \\frac{...}{...}" if token == "/" else ""
         return f"unexpected character {str(token)!r}{hint}"
-    if token.type in {"_NORM_OPEN", "_ABS_OPEN"}:
-        return f"{token} is not paired with a closing one"
     return f"unexpected {str(token)!r}"
 
 

@@ -140,9 +140,11 @@ class Reading(ABC):
     def _chain(self, factors: list[tuple[Value, str]]) -> tuple[Value, str]:
         for i in range(len(factors) - 1):
             if factors[i][1] == "vector" and factors[i + 1][1] == "covector":
-                (left, _), (right, kind) = self._chain(factors[: i + 1]), self._chain(factors[i + 1 :])
-                if kind == "scalar":
-                    return scaled(left, right), "vector"
+                (left, before), (right, after) = self._chain(factors[: i + 1]), self._chain(factors[i + 1 :])
+                if before == "scalar":
+                    return scaled(right, self.hold(left)), after
+                if after == "scalar":
+                    return scaled(left, self.hold(right)), before
                 left, right = map_value(left, self.hold), map_value(right, self.hold)
                 return [[a * b for b in right] for a in left], "matrix"
         (left, kind), *rest = factors

@@ -95,6 +95,9 @@ def _claim(judged: Judged, trial: Trial, repairs: dict[int, Repair | None]) -> d
         "printed": chain_latex(claim.relation.members),
         "correction": chain_latex(repair.members) if repair else _derived(judged) if refuted else None,
         "change": describe(repair) if repair else None,
+        "edit": {"kind": repair.change, "before": latex(repair.before), "after": latex(repair.after)}
+        if repair
+        else None,
         "witness": _witness(judged),
         "effect": _effect(judged) if refuted and not finding.undefined and not judged.because else None,
     }

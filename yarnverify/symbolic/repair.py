@@ -73,8 +73,9 @@ class Workshop:
         return None
 
     def _proved(self, candidate: Candidate) -> bool:
-        court = self.court.reaching(candidate.members)
-        return all(court.judge(*pair).verdict is Verdict.PROVED for pair in self.sides(candidate.members))
+        pairs = self.sides(candidate.members)
+        court = self.court.reaching([side for pair in pairs for side in pair])
+        return all(court.judge(*pair).verdict is Verdict.PROVED for pair in pairs)
 
     @cached_property
     def _floats(self) -> list[Evaluation]:

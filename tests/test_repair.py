@@ -1,0 +1,173 @@
+"""Repairs: a single mistake planted into a correct equation is found and mended, and the mended equation is proved."""
+
+from __future__ import annotations
+
+import pytest
+
+from yarnverify.library import Shelf
+from yarnverify.source import Source
+from yarnverify.symbolic.declare import Declarations
+from yarnverify.symbolic.document import Section
+from yarnverify.symbolic.prove import Court, Verdict, read_with
+from yarnverify.symbolic.reader import read_formula
+from yarnverify.symbolic.record import prove_source
+from yarnverify.symbolic.repair import Repair, Workshop, chain_latex, describe
+from yarnverify.symbolic.tree import Expr
+
+BLOCKS = {
+    "F_x1": r"\mathbf{F}_{\mathbf{x}_1}",
+    "F_u1": r"F_{u_1}",
+    "F_u0": r"F_{u_0}",
+    "dF_x1/dx1": r"\frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial \mathbf{x}_1}",
+    "dF_u1/dx1": r"\frac{\partial F_{u_1}}{\partial \mathbf{x}_1}",
+}
+MANY = None
+
+
+@pytest.fixture(scope="module")
+def courts(source: Source, declarations: Declarations) -> dict[str, Court]:
+    sections = read_with(source, declarations).sections
+    return {s.title: Court(s, s.energy.expression) for s in sections if s.energy is not None}
+
+
+def mend(court: Court, left: str, right: str) -> Repair | None:
+    members = (read_formula(left), read_formula(right))
+    return Workshop(court.reaching(members), members, lambda trees: [(trees[0], trees[1])]).find()
+
+
+def proved(court: Court, members: tuple[Expr, ...]) -> bool:
+    return court.reaching(members).judge(members[0], members[-1]).verdict is Verdict.PROVED
+
+
+BEND = r"\frac{2 k_b \theta}{l_1 (u_1 - u_2) \sin \theta}"
+
+
+@pytest.mark.parametrize(
+    ("title", "block", "right", "change"),
+    [
+        ("Stretch", "F_x1", r"k_s (\|\mathbf{w}_1\| - 1) \mathbf{d}_1", "sign"),
+        ("Stretch", "F_x1", r"-k_s (\|\mathbf{w}_1\| + 1) \mathbf{d}_1", "sign"),
+        ("Stretch", "F_x1", r"-k_s (\|\mathbf{w}_1\| - 1) \mathbf{d}_2", "index"),
+        ("Stretch", "F_x1", r"-k_s (\|\mathbf{w}_1\| - 1) \mathbf{d}_1^T", "transpose"),
+        ("Stretch", "dF_u1/dx1", r"\frac{k_s}{\Delta u} \mathbf{w}_1", "transpose"),
+        ("Stretch", "F_x1", r"-\frac{1}{2} k_s (\|\mathbf{w}_1\| - 1) \mathbf{d}_1", "missing factor"),
+        ("Stretch", "F_x1", r"-k_s (\|\mathbf{w}_1\| - 2) \mathbf{d}_1", "number"),
+        ("Stretch", "F_u1", r"\frac{1}{2} k_s (\|\mathbf{w}_1\| - 1)", "power"),
+        ("Stretch", "F_u1", r"\frac{1}{2} k_s (\|\mathbf{w}_1\|^3 - 1)", "power"),
+        ("Stretch", "F_u1", r"\frac{1}{2} k_s \Delta u (\|\mathbf{w}_1\|^2 - 1)", "extra factor"),
+        ("Stretch", "F_u1", r"\frac{1}{2} (\|\mathbf{w}_1\|^2 - 1)", "missing factor"),
+        ("Stretch", "F_u1", r"\frac{k_s}{2} (\|\mathbf{w}_1\|^2 - 1 + l_1)", "extra term"),
+        ("Stretch", "F_u1", r"\frac{2}{k_s} (\|\mathbf{w}_1\|^2 - 1)", "fraction upside down"),
+        ("Stretch", "F_x1", r"-K (\|\mathbf{w}_1\| - 1) \mathbf{d}_1", "undefined symbol"),
+        ("Stretch", "dF_x1/dx1", r"\frac{k_s}{\Delta u} \mathbf{P}_1 - \frac{k_s}{\Delta u} \mathbf{I}", "symbol"),
+        (
+            "Bending",
+            "F_x1",
+            r"-\frac{2 k_b \theta}{(u_1 - u_2) \sin \theta} \mathbf{P}_1 \mathbf{d}_2",
+            "missing denominator",
+        ),
+        ("Bending", "F_x1", r"-\frac{2 k_b \theta}{l_1 (u_1 - u_2) \cos \theta} \mathbf{P}_1 \mathbf{d}_2", "function"),
+        ("Bending", "F_x1", r"-\frac{2 k_b \theta}{l_1 (u_1 - u_2)} \mathbf{P}_1 \mathbf{d}_2", "missing denominator"),
+        ("Bending", "F_x1", r"-\frac{2 k_b \theta}{l_1 (u_1 - u_2)^2 \sin \theta} \mathbf{P}_1 \mathbf{d}_2", "power"),
+        ("Bending", "F_x1", rf"-{BEND} \mathbf{{d}}_2", "missing factor"),
+        ("Bending", "F_x1", rf"-{BEND} \mathbf{{P}}_2 \mathbf{{d}}_1", MANY),
+        ("Bending", "F_x1", rf"-\frac{{1}}{{l_2}} {BEND} \mathbf{{P}}_1 \mathbf{{d}}_2", "extra"),
+        ("Shear", "F_x1", r"\frac{k_x L (\phi - \pi)}{l_1 \sin \phi} \mathbf{P}_1 \mathbf{d}_3", "missing factor"),
+        ("Shear", "F_x1", r"\frac{k_x L (\phi - \frac{\pi}{2})}{l_3 \sin \phi} \mathbf{P}_1 \mathbf{d}_3", "index"),
+        (
+            "Shear",
+            "F_x1",
+            r"\frac{k_x L (\psi - \frac{\pi}{2})}{l_1 \sin \psi} \mathbf{P}_1 \mathbf{d}_3",
+            "undefined symbol",
+        ),
+        ("Parallel Contact", "F_u0", r"k_c d (\Delta u - d)", "symbol"),
+        ("Parallel Contact", "F_u0", r"k_c L (\Delta u + d)", "sign"),
+        ("Parallel Contact", "F_u0", r"L (\Delta u - d)", "missing factor"),
+    ],
+)
+def test_a_planted_mistake_is_mended(
+    courts: dict[str, Court], title: str, block: str, right: str, change: str | None
+) -> None:
+    court = courts[title]
+    assert not proved(court, (read_formula(BLOCKS[block]), read_formula(right)))
+    repair = mend(court, BLOCKS[block], right)
+    if change is MANY:  # two mistakes at once are not one small change, unless they happen to be
+        assert repair is None or proved(court, repair.members)
+        return
+    assert repair is not None
+    assert proved(court, repair.members)
+    assert repair.change.startswith(change)
+    assert chain_latex(repair.members[:1]) == BLOCKS[block]  # the name of the block is left alone
+
+
+@pytest.mark.parametrize(
+    ("right", "text"),
+    [
+        (r"k_s (\|\mathbf{w}_1\| - 1) \mathbf{d}_1", r"sign of k_s"),
+        (r"-k (\|\mathbf{w}_1\| - 1) \mathbf{d}_1", r"k should be k_s"),
+        (r"-k_s (\|\mathbf{w}_1\| - 1) \mathbf{d}_2", r"index: \mathbf{d}_2 should be \mathbf{d}_1"),
+        (r"-k_s (\|\mathbf{w}_1\| - 3) \mathbf{d}_1", r"number: 3 should be 1"),
+    ],
+)
+def test_a_change_is_described_in_the_notation_of_the_paper(courts: dict[str, Court], right: str, text: str) -> None:
+    repair = mend(courts["Stretch"], BLOCKS["F_x1"], right)
+    assert repair is not None
+    assert describe(repair).startswith(text)
+
+
+def test_a_wrong_name_of_a_block_is_mended(courts: dict[str, Court]) -> None:
+    repair = mend(courts["Bending"], r"\mathbf{F}_{\mathbf{x}_2}", rf"-{BEND} \mathbf{{P}}_1 \mathbf{{d}}_2")
+    assert repair is not None
+    assert describe(repair) == r"index: \mathbf{F}_{\mathbf{x}_2} should be \mathbf{F}_{\mathbf{x}_1}"
+
+
+@pytest.mark.parametrize(
+    "right",
+    [
+        r"-k_s \|\mathbf{w}_1\|^5 \mathbf{d}_3",  # nothing like the force
+        r"7 q \mathbf{d}_1",  # an undefined symbol that no symbol stands for
+        r"\frac{1}{u_1 - u_1} \mathbf{d}_1 \mathbf{d}_1^T",
+    ],
+)
+def test_what_no_small_change_mends_is_left(courts: dict[str, Court], right: str) -> None:
+    assert mend(courts["Stretch"], BLOCKS["F_x1"], right) is None
+
+
+def test_a_chain_is_mended_as_a_whole(courts: dict[str, Court]) -> None:
+    """One change of the last member has to serve all claims; a wrong sign of one member is its own."""
+    court = courts["Stretch"]
+    force, other, right = (
+        read_formula(t) for t in (r"F_{u_1}", r"F_{u_0}", r"\frac{1}{2} k_s (\|\mathbf{w}_1\|^2 - 1)")
+    )
+    members = (force, other, right)
+    repair = Workshop(court, members, lambda trees: [(left, trees[-1]) for left in trees[:-1]]).find()
+    assert repair is not None
+    assert repair.members == (force, -other, right)
+
+
+def test_an_equation_beyond_repair_gets_the_derived_block(source: Source) -> None:
+    text = r"""
+## Spring
+
+$$V = \frac{1}{2} k (\|\mathbf{x}_1 - \mathbf{x}_0\| - L)^2 \quad (1)$$
+
+$$\mathbf{F}_{\mathbf{x}_1} = -\mathbf{F}_{\mathbf{x}_0} = k^3 L \mathbf{x}_1 - 5 \mathbf{x}_0 \quad (2)$$
+
+$$\frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial \mathbf{x}_1} = k^3 L \mathbf{I} \quad (3)$$
+
+$$\|\mathbf{x}_1 - \mathbf{x}_0\|^2 = k^3 L \quad (4)$$
+"""
+    record = prove_source(Source("spring.md", text), Shelf(None, "spring.md", "by itself"))
+    document = read_with(Source("spring.md", text), Declarations())
+    section: Section = document.sections[0]
+    assert section.energy is not None
+    court = Court(section, section.energy.expression)
+    for claim in record["claims"]:
+        assert (claim["verdict"], claim["change"]) == ("refuted", None)
+        if claim["equation"] == "4":
+            assert claim["correction"] is None  # not a block of the energy; there is nothing to derive
+            continue
+        block, derived = map(read_formula, claim["correction"].split(" = "))
+        expanded = [s for s in section.undefined(derived) if s.base not in "ldP"]
+        assert not expanded  # written with the length, direction and projection of the segment
+        assert court.judge(block, block).verdict is Verdict.PROVED
