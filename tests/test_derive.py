@@ -1,7 +1,5 @@
 """Derivations: every block of every energy is proved against the exact derivatives of its definition."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -30,37 +28,37 @@ def tangent(half: Expr) -> Expr:
 
 
 @energy()
-def rest_angle(x0: Point, x1: Point, x2: Point, *, k: Positive["N m"], theta_0: Real[rad]):
+def rest_angle(x0: Point, x1: Point, x2: Point, *, k: Positive["N m"], theta_0: Real["rad"]):
     return k * (angle(x1 - x0, x0 - x2) - theta_0) ** 2
 
 
 @energy()
-def rod(x0: Point, x1: Point, x2: Point, *, B: Positive["N m^2"], L: Positive[m]):
+def rod(x0: Point, x1: Point, x2: Point, *, B: Positive["N m^2"], L: Positive["m"]):
     return B * (2 * tangent(angle(x1 - x0, x0 - x2) / 2)) ** 2 / (2 * L)
 
 
 @energy()
-def cubic(x0: Point, x1: Point, *, k: Positive[N]):
+def cubic(x0: Point, x1: Point, *, k: Positive["N"]):
     return k * length(x1 - x0) ** 3
 
 
 @energy()
-def root(x0: Point, x1: Point, u1: Sliding, *, k: Positive[N]):
+def root(x0: Point, x1: Point, u1: Sliding, *, k: Positive["N"]):
     return k * Expr("sqrt", (length(x1 - x0) ** 2 + u1**2,))
 
 
 @energy()
-def two_measures(x0: Point, x1: Point, x2: Point, u1: Sliding, *, k: Positive[N], L: Positive[m]):
+def two_measures(x0: Point, x1: Point, x2: Point, u1: Sliding, *, k: Positive["N"], L: Positive["m"]):
     return k * (length(x1 - x0) - L) ** 2 * (deviation(x1 - x0, x2 - x0) + u1) ** 2
 
 
 @energy()
-def elsewhere(x1: Point, x2: Point, *, k: Positive[N], L: Positive[m]):
+def elsewhere(x1: Point, x2: Point, *, k: Positive["N"], L: Positive["m"]):
     return k * (length(x2 - x1) - L) ** 2 / 2
 
 
 @energy()
-def chain(x0: Point, x1: Point, x2: Point, x3: Point, *, k: Positive[N]):
+def chain(x0: Point, x1: Point, x2: Point, x3: Point, *, k: Positive["N"]):
     return k * (length(x1 - x0) ** 2 + length(x2 - x1) * length(x3 - x2))
 
 
@@ -80,7 +78,7 @@ def sliding(u0: Sliding, u1: Sliding, *, k: Positive["N m^-1"]):
 
 
 @energy(domain="u_1 > u_0")
-def rate(x0: Point, x1: Point, u0: Sliding, u1: Sliding, *, k: Positive[N]):
+def rate(x0: Point, x1: Point, u0: Sliding, u1: Sliding, *, k: Positive["N"]):
     return k * (length((x1 - x0) / length(u1 - u0)) - 1) ** 2
 
 
@@ -88,27 +86,27 @@ MADE = (rest_angle, rod, cubic, root, two_measures, elsewhere, chain, kink, cosi
 
 
 @energy()
-def inner_product(x0: Point, x1: Point, x2: Point, *, k: Positive[N]):
+def inner_product(x0: Point, x1: Point, x2: Point, *, k: Positive["N"]):
     return k * Expr("dot", (x1 - x0, x2 - x0))
 
 
 @energy()
-def volume(x0: Point, x1: Point, x2: Point, *, k: Positive[N]):
+def volume(x0: Point, x1: Point, x2: Point, *, k: Positive["N"]):
     return k * length(Expr("cross", (x1 - x0, x2 - x0)))
 
 
 @energy()
-def middle(x0: Point, x1: Point, x2: Point, *, k: Positive[N]):
+def middle(x0: Point, x1: Point, x2: Point, *, k: Positive["N"]):
     return k * length(x0 + x1 - 2 * x2)
 
 
 @energy()
-def flat_angle(x0: Point, x1: Point, *, k: Positive[N]):
+def flat_angle(x0: Point, x1: Point, *, k: Positive["N"]):
     return k * angle(x1 - x0, x1 - x0) + k * Expr("call", (2 * (unit(x1 - x0).T * unit(x0 - x1)),), "arccos")
 
 
 @energy()
-def coordinate(x0: Point, x1: Point, *, k: Positive[N]):
+def coordinate(x0: Point, x1: Point, *, k: Positive["N"]):
     return k * (x0.T * x1)
 
 
@@ -160,7 +158,7 @@ def test_the_angles_of_the_paper_keep_their_names(declarations: Declarations) ->
 
 def test_an_angle_does_not_take_the_name_of_a_parameter() -> None:
     @energy()
-    def named(x0: Point, x1: Point, x2: Point, *, theta: Positive[N], theta_1: Positive[N]):
+    def named(x0: Point, x1: Point, x2: Point, *, theta: Positive["N"], theta_1: Positive["N"]):
         return theta * angle(x1 - x0, x2 - x0) ** 2 + theta_1 * angle(x1 - x0, x0 - x2)
 
     derivation = derived(named)

@@ -54,6 +54,7 @@ class Section:
     parameters: tuple[Name, ...] = ()
     unknowns: tuple[Name, ...] = ()
     declared: Energy | None = None
+    stand_ins: dict[Name, Expr | None] = field(default_factory=dict)
     _meanings: dict[Name, Expr | None] = field(default_factory=dict, repr=False, compare=False)
     _shapes: dict[Name, Type] = field(default_factory=dict, repr=False, compare=False)
     families: set[tuple[str, bool]] = field(default_factory=lambda: {("x", True), ("u", False), ("v", False)})
@@ -85,9 +86,17 @@ class Section:
         found = self.definition(name)
         if found is None:
             return None
+        expression = self._expression(found)
         if not found.index or name.sub == found.index:
-            return found.expression
-        return instantiate(found.expression, found.index, name.sub)
+            return expression
+        return instantiate(expression, found.index, name.sub)
+
+    def _expression(self, definition: Definition) -> Expr:
+        """What a definition says, or what stands in for it."""
+        for section in (self, self.shared):
+            if section is not None and section.definitions.get(definition.symbol) is definition:
+                return section.stand_ins.get(definition.symbol) or definition.expression
+        return definition.expression
 
     def is_unknown(self, name: Name) -> bool:
         """Whether a symbol is a degree of freedom of some crossing: x_1, u_0, v_3, and families like them."""
@@ -99,8 +108,17 @@ class Section:
             raise ShapeError(at, f"{name_latex(name)} is defined by itself")
         return (*inside, name)
 
-    def undefined(self, expr: Expr) -> list[Name]:
-        """Symbols under a tree that nothing defines, followed through definitions, in printed order."""
+    def definitions_used(self, expr: Expr) -> set[Name]:
+        """Symbols of the definitions that a tree uses, directly or through others."""
+        found: set[Name] = set()
+        for node in expr.walk():
+            definition = self.definition(node.name) if node.op == "symbol" else None
+            if definition is not None and definition.symbol not in found:
+                found |= {definition.symbol} | self.definitions_used(definition.expression)
+        return found
+
+    def undefined(self, expr: Expr, follow: bool = True) -> list[Name]:
+        """Symbols under a tree that nothing defines, in printed order; through definitions too, unless told not to."""
         found: dict[Name, None] = {}
         seen: set[Name] = set()
 
@@ -115,7 +133,8 @@ class Section:
                 seen.add(part.name)
                 meaning = self.meaning(part.name)
                 if meaning is not None:
-                    visit(meaning, self._enter(part.name, inside, part))
+                    if follow:
+                        visit(meaning, self._enter(part.name, inside, part))
                 elif not self.is_unknown(part.name) and part.name not in self.parameters:
                     found.setdefault(part.name)
 

@@ -195,8 +195,7 @@ class Court:
         """Whether two trees are equal."""
         missing = tuple(dict.fromkeys([*self.section.undefined(left), *self.section.undefined(right)]))
         if missing:
-            symbols = ", ".join(name_latex(name) for name in missing)
-            return Finding(Verdict.REFUTED, f"undefined symbol {symbols}", undefined=missing)
+            return _undefined(missing)
         kinds = [self.section.type_of(side) for side in (left, right)]
         if kinds[0] is not kinds[1] and not (is_zero(left) or is_zero(right)):
             return Finding(Verdict.REFUTED, f"a {kinds[0].value} cannot equal a {kinds[1].value}")
@@ -221,6 +220,11 @@ class Court:
                 Verdict.UNDECIDED, "the exact readings differ, but no ball arithmetic could tell the sides apart"
             )
         return Finding(Verdict.REFUTED, "", witness)
+
+
+def _undefined(missing: tuple[Name, ...]) -> Finding:
+    symbols = ", ".join(name_latex(name) for name in missing)
+    return Finding(Verdict.REFUTED, f"undefined symbol {symbols}", undefined=missing)
 
 
 def _spread(state: dict[Name, Any]) -> Fraction:
@@ -278,10 +282,15 @@ class Trial:
 
 
 def declared_meaning(section: Section, symbol: Name, declarations: Declarations) -> Quantity | None:
-    """The declared quantity behind a symbol of a section."""
+    """The declared quantity behind a symbol of a section; a running index may have another letter than declared."""
     for found in declarations.quantities:
-        if found.symbol == symbol and found.section in ("", section.title):
+        if found.section not in ("", section.title):
+            continue
+        if found.symbol == symbol:
             return found
+        index, letter = found.symbol.sub, symbol.sub
+        if found.symbol.with_sub(letter) == symbol and all(len(i) == 1 and i.isalpha() for i in (index, letter)):
+            return replace(found, symbol=symbol, expression=instantiate(found.expression, index, letter))
     return None
 
 
@@ -303,20 +312,19 @@ def try_document(
     judged: list[Judged] = []
     given: list[tuple[Section, Definition, str]] = []
     completeness: list[Completeness] = []
-    definitions = [
-        item for part in (document.shared, *document.sections) for item in _definition_claims(part, declarations)
-    ]
-    for section, definition, quantity in definitions:
-        if quantity is None:
+    broken = _stand_in(document, declarations)
+    for section, definition, quantity in _definitions(document, declarations):
+        missing = broken.get(definition.relation.offset, ())
+        if quantity is None and not missing:
             given.append((section, definition, "definition"))
             continue
         claim, court, index = definition_claim(section, definition, quantity)
-        judged.append(Judged(section, claim, "definition", court.judge(claim.left, claim.right), court, index=index))
+        finding = _undefined(missing) if missing else court.judge(claim.left, claim.right)
+        wrong = [j for j in judged if j.finding.verdict is not Verdict.PROVED and not j.finding.undefined]
+        found = _Appeal(court, wrong, declarations).judged(claim, "definition", finding)
+        judged.append(replace(found, index=index))
         advance(definition.relation.equation)
     wrong = [j for j in judged if j.finding.verdict is not Verdict.PROVED]
-    for part in (document.shared, *document.sections):
-        _stand_in(part, declarations, [j for j in wrong if j.finding.undefined and j.section is part])
-        part.forget()
     for section in document.sections:
         assert section.energy is not None
         truth, blamed = section.energy.expression, [j for j in wrong if j.section in (section, document.shared)]
@@ -344,18 +352,35 @@ def try_document(
     return Trial(document, tuple(judged), tuple(given), tuple(completeness))
 
 
-def _definition_claims(
-    section: Section, declarations: Declarations
+def _definitions(
+    document: Document, declarations: Declarations
 ) -> Iterator[tuple[Section, Definition, Quantity | None]]:
-    for definition in section.definitions.values():
-        yield section, definition, declared_meaning(section, definition.symbol, declarations)
+    """Every definition as printed, with what is declared of its symbol."""
+    for section in (document.shared, *document.sections):
+        for definition in section.definitions.values():
+            yield section, definition, declared_meaning(section, definition.symbol, declarations)
+
+
+def _stand_in(document: Document, declarations: Declarations) -> dict[int, tuple[Name, ...]]:
+    """Let declared meanings stand in for printed definitions with undefined symbols; those symbols, by place."""
+    broken: dict[int, tuple[Name, ...]] = {}
+    parameters = {name for section in document.sections for name in section.parameters}
+    for section, definition, quantity in _definitions(document, declarations):
+        missing = [n for n in section.undefined(definition.expression, follow=False) if n not in parameters]
+        if missing:
+            broken[definition.relation.offset] = tuple(missing)
+            section.stand_ins[definition.symbol] = quantity.expression if quantity is not None else None
+    for section in (document.shared, *document.sections):
+        section.forget()
+    return broken
 
 
 def definition_claim(
-    section: Section, definition: Definition, quantity: Quantity
+    section: Section, definition: Definition, quantity: Quantity | None
 ) -> tuple[Claim, Court, tuple[str, str]]:
     """The claim that a printed definition is the declared one, for one value of its running index."""
-    declared, printed, value = quantity.expression, definition.expression, ""
+    printed, value = definition.expression, ""
+    declared = quantity.expression if quantity is not None else printed
     if definition.index:
         used = {name.sub for tree in (declared, printed) for name in section.base_symbols(tree)}
         value = next(str(i) for i in range(1, 100) if str(i) not in used)
@@ -364,18 +389,9 @@ def definition_claim(
     return claim, Court(section, ZERO, [declared, printed]), (definition.index, value)
 
 
-def _stand_in(section: Section, declarations: Declarations, broken: Iterable[Judged]) -> None:
-    """Put the declared definitions in place of printed ones that have undefined symbols."""
-    for judged in broken:
-        for symbol, definition in list(section.definitions.items()):
-            quantity = declared_meaning(section, symbol, declarations)
-            if definition.relation is judged.claim.relation and quantity is not None:
-                section.definitions[symbol] = replace(definition, expression=quantity.expression)
-
-
 def as_declared(section: Section, declarations: Declarations) -> Section:
     """A section with every declared definition in place of its printed one."""
-    copy = replace(section, definitions=dict(section.definitions), claims=[], _meanings={}, _shapes={})
+    copy = replace(section, definitions=dict(section.definitions), claims=[], stand_ins={}, _meanings={}, _shapes={})
     if section.shared is not None:
         copy.shared = as_declared(section.shared, declarations)
     for symbol, definition in section.definitions.items():
@@ -401,11 +417,26 @@ class _Appeal:
         return Court(section, energy, [self.court.energy])
 
     def judged(self, claim: Claim, kind: str, finding: Finding) -> Judged:
-        roots = tuple(dict.fromkeys(j.claim.relation.equation for j in self.blamed if not j.because))
-        if finding.verdict is not Verdict.REFUTED or finding.undefined or not roots:
-            return Judged(self.court.section, claim, kind, finding, self.court)
+        section = self.court.section
+        roots = self._roots(claim)
+        if finding.verdict is not Verdict.REFUTED or not roots:
+            return Judged(section, claim, kind, finding, self.court)
+        if finding.undefined:  # its own symbols, or those of a definition that it uses
+            own = any(section.undefined(side, follow=False) for side in (claim.left, claim.right))
+            return Judged(section, claim, kind, finding, self.court, () if own else roots)
         explained = self.fair.judge(claim.left, claim.right).verdict is Verdict.PROVED
-        return Judged(self.court.section, claim, kind, finding, self.fair, roots if explained else ())
+        return Judged(section, claim, kind, finding, self.fair, roots if explained else ())
+
+    def _roots(self, claim: Claim) -> tuple[str, ...]:
+        """Equations to blame: the refuted energy, and refuted definitions that the claim or the energy uses."""
+        section = self.court.section
+        used = {
+            name for tree in (claim.left, claim.right, self.court.energy) for name in section.definitions_used(tree)
+        }
+        blamed = [
+            j for j in self.blamed if not j.because and (j.kind == "energy" or j.claim.relation.members[0].name in used)
+        ]
+        return tuple(dict.fromkeys(j.claim.relation.equation for j in blamed))
 
 
 def _kind(claim: Claim) -> str:

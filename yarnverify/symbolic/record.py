@@ -126,9 +126,9 @@ def _repair(judged: Judged) -> Repair | None:
         def sides(trees: tuple[Expr, ...]) -> list[tuple[Expr, Expr]]:
             return [(declared, instantiate(trees[1], index, value) if index else trees[1])]
 
-        return Workshop(judged.court, members, sides).find()
+        return Workshop(judged.court, members, sides, fixed=1).find()
     if judged.kind == "energy":
-        return Workshop(judged.court, members, lambda trees: [(judged.court.energy, trees[1])]).find()
+        return Workshop(judged.court, members, lambda trees: [(judged.court.energy, trees[1])], fixed=1).find()
     return Workshop(judged.court, members, lambda trees: [(left, trees[-1]) for left in trees[:-1]]).find()
 
 

@@ -55,10 +55,14 @@ class Workshop:
         The printed chain.
     sides
         The claims that a chain makes, as pairs that must be equal.
+    fixed
+        How many members at its beginning are not in doubt.
     """
 
-    def __init__(self, court: Court, members: tuple[Expr, ...], sides: Callable[[tuple[Expr, ...]], Sides]) -> None:
-        self.court, self.members, self.sides = court, members, sides
+    def __init__(
+        self, court: Court, members: tuple[Expr, ...], sides: Callable[[tuple[Expr, ...]], Sides], fixed: int = 0
+    ) -> None:
+        self.court, self.members, self.sides, self.fixed = court, members, sides, fixed
         self.section: Section = court.section
 
     def find(self) -> Repair | None:
@@ -109,6 +113,8 @@ class Workshop:
     def _candidates(self) -> Iterator[Candidate]:
         yield from self._renamings()
         for index, member in enumerate(self.members):
+            if index < self.fixed:
+                continue
             aside = int(bool(block_of(member)))  # what is printed of a block is doubted before the block's own name
             for cost, change, before, after, tree in self._changes(member):
                 members = (*self.members[:index], tree, *self.members[index + 1 :])
