@@ -412,6 +412,16 @@ $$\frac{\partial \theta}{\partial \mathbf{x}_2} = \frac{1}{\|\mathbf{f}\| \sin \
 
 $$\mathbf{F}_{\mathbf{x}_2} = -\frac{2 B \tan (\frac{\theta}{2})}{\cos^2 (\frac{\theta}{2}) \|\mathbf{f}\| \sin \theta} \left( \frac{\cos \theta}{\|\mathbf{f}\|} \mathbf{f} - \frac{1}{\|\mathbf{e}\|} \mathbf{e} \right) \quad (10)$$
 """  # noqa: E501
+WRONG_ROD = ROD
+for _right, _wrong in [
+    (r"1 - \cos \theta}{1 + \cos \theta}", r"1 + \cos \theta}{1 - \cos \theta}"),
+    (r"{2 \|\mathbf{e} \times", r"{\|\mathbf{e} \times"),
+    (r"= -(\mathbf{F}", r"= (\mathbf{F}"),
+    (r"\frac{1}{\|\mathbf{f}\| \sin \theta}", r"\frac{1}{\|\mathbf{e}\| \sin \theta}"),
+    (r"-\frac{2 B", r"-\frac{B"),
+]:
+    assert _right in WRONG_ROD
+    WRONG_ROD = WRONG_ROD.replace(_right, _wrong, 1)
 PRODUCTS = r"""
 ## Products
 
@@ -431,11 +441,7 @@ $$\frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial \mathbf{x}_1} = -b \left( \
         (SPRING, r"\frac{k L}{l_1} (\mathbf{I}", r"\frac{k L}{l_1^2} (\mathbf{I}", {"5"}),
         (SPRING, r"= \mathbf{d}_1^T", r"= -\mathbf{d}_1^T", {"6"}),
         (ROD, "", "", set()),
-        (ROD, r"1 - \cos \theta}{1 + \cos \theta}", r"1 + \cos \theta}{1 - \cos \theta}", {"6"}),
-        (ROD, r"{2 \|\mathbf{e} \times", r"{\|\mathbf{e} \times", {"7"}),
-        (ROD, r"= -(\mathbf{F}", r"= (\mathbf{F}", {"8"}),
-        (ROD, r"\frac{1}{\|\mathbf{f}\| \sin \theta}", r"\frac{1}{\|\mathbf{e}\| \sin \theta}", {"9"}),
-        (ROD, r"-\frac{2 B", r"-\frac{B", {"10"}),
+        (WRONG_ROD, "", "", {"6", "7", "8", "9", "10"}),
         (PRODUCTS, "", "", set()),
         (PRODUCTS, r"- b (\mathbf{x}_2", r"+ b (\mathbf{x}_2", {"2"}),
         (PRODUCTS, r"\|\mathbf{x}_2 - \mathbf{x}_0\|^2 \mathbf{I} -", r"\mathbf{I} -", {"3"}),

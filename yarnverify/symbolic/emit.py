@@ -22,6 +22,7 @@ from yarnverify.symbolic.reading import Reading, UnsupportedError, Value, map_va
 from yarnverify.symbolic.tree import FORCE, Expr, Name
 
 AXES = "xyz"
+_OUTPUT = re.compile(r"(g|h|F|dF)_")  # names of block entries; an expression shared with others is not called by them
 Formulas = Mapping[Expr, Expr]  # what each force and Jacobian node stands for
 
 
@@ -260,11 +261,11 @@ def _settled(
 def _without_aliases(
     shared: dict[sp.Symbol, Any], named: Iterable[sp.Symbol], reduced: list[Any]
 ) -> tuple[dict[sp.Symbol, Any], list[Any]]:
-    """Steps and outputs in which no step merely renames another: a shared expression takes the name it was given first."""
+    """Steps and outputs in which no step merely renames another: a shared expression takes its given name, if it has one."""
     names = list(named)
     rename: dict[sp.Symbol, sp.Symbol] = {}
     for name, value in zip(names, reduced, strict=False):
-        if value in shared and value not in rename:
+        if value in shared and value not in rename and not _OUTPUT.match(str(name)):
             rename[value] = name
         elif value.is_Symbol:
             rename[name] = rename.get(value, value)

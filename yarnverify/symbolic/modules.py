@@ -145,6 +145,7 @@ def _module(energy: Energy, variant: str, made: Program, document: str, notes: l
     functions = _functions(made, [label.replace(".", "") for label in dofs], names)
     code = "\n".join(line for function in functions for line in function["lines"])
     full, upper = f"({len(dofs)}, {len(dofs)}, n)", f"({len(dofs) * (len(dofs) + 1) // 2}, n)"
+    units = f"{energy.unit}, {energy.unit}/m and {energy.unit}/m^2"
     vector, three = f"({len(dofs)}, n)", "tuple[Array, Array, Array]"
     return _TEMPLATES.get_template("kernel.py.jinja").render(
         energy=energy,
@@ -163,16 +164,11 @@ def _module(energy: Energy, variant: str, made: Program, document: str, notes: l
         checks=made.checks,
         active=made.active is not None,
         public=(
-            ("energy", "(n,)", "Energy of each element", "Array"),
-            ("gradient", vector, "Gradient of each element; the force is its negative", "Array"),
-            ("hessian", full, "Hessian of each element, exactly symmetric", "Array"),
-            ("evaluate", f"(n,), {vector} and {full}", "Energy, gradient and Hessian, sharing what they share", three),
-            (
-                "packed",
-                f"(n,), {vector} and {upper}",
-                "Energy, gradient and the Hessian's upper triangle, row by row",
-                three,
-            ),
+            ("energy", "(n,)", "Energy of each element", energy.unit, "Array"),
+            ("gradient", vector, "Gradient, the negative of the force", f"{energy.unit}/m", "Array"),
+            ("hessian", full, "Hessian, exactly symmetric", f"{energy.unit}/m^2", "Array"),
+            ("evaluate", f"(n,), {vector}, {full}", "Energy, gradient and Hessian at once", units, three),
+            ("packed", f"(n,), {vector}, {upper}", "The same, of the Hessian the upper triangle row by row", units, three),
         ),
     )
 
