@@ -254,8 +254,8 @@ def _angles() -> Iterator[tuple[str, str]]:
 
 @pytest.mark.parametrize(("left", "right"), [*_angles()])
 def test_exact_angles_obey_their_laws(left: str, right: str) -> None:
-    near = {**STATE, POINTS[0]: (Fraction(0), Fraction(1, 8), Fraction(0)), POINTS[1]: (Fraction(1, 4), Fraction(1, 2), Fraction(0)),
-            POINTS[2]: (Fraction(1, 8), Fraction(1, 4), Fraction(1, 2))}  # fmt: skip
+    places = zip(POINTS, ((0, 1, 0), (2, 4, 0), (1, 2, 4)), strict=True)
+    near = {**STATE, **{name: tuple(Fraction(part, 8) for part in place) for name, place in places}}
     evaluation = Evaluation(MADE, near, Rationals(0))
     assert evaluation.value(read_formula(left)) == evaluation.value(read_formula(right))
 

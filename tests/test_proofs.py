@@ -16,7 +16,7 @@ from yarnverify.source import Source
 from yarnverify.symbolic.declare import Declarations
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.forward import Evaluation, UndefinedError
-from yarnverify.symbolic.prove import Court, Verdict, hexadecimal, read_with, try_document
+from yarnverify.symbolic.prove import Court, Verdict, _Comparison, hexadecimal, read_with, try_document
 from yarnverify.symbolic.reader import read_formula
 from yarnverify.symbolic.reading import UnsupportedError
 from yarnverify.symbolic.record import prove_source
@@ -201,8 +201,8 @@ TRUE, WRONG = read_formula(r"-k (l_1 - L) \mathbf{d}_1"), read_formula(r"k (l_1 
     [
         ("_equal_normal", True, WRONG, "equal as normal forms, different at an exact state"),
         ("_equal_normal", False, TRUE, "different as normal forms, equal at every exact state tried"),
-        ("_differs", (None, 3), WRONG, "different as normal forms, equal at every exact state tried"),
-        ("_differs", ({}, 3), TRUE, "equal as normal forms, different at an exact state"),
+        ("_compare", _Comparison(3, None), WRONG, "different as normal forms, equal at every exact state tried"),
+        ("_compare", _Comparison(3, {}), TRUE, "equal as normal forms, different at an exact state"),
     ],
 )
 def test_readings_that_contradict_each_other_are_inconsistent(
@@ -390,9 +390,9 @@ def test_a_block_that_is_zero_need_not_be_listed(source: Source) -> None:
 ROD = r"""
 # Discrete rod
 
-$$\mathbf{e} = \mathbf{x}_1 - \mathbf{x}_0 \quad (1)$$
+$$\mathbf{e} = \mathbf{x}_0 - \mathbf{x}_1 \quad (1)$$
 
-$$\mathbf{f} = \mathbf{x}_2 - \mathbf{x}_1 \quad (2)$$
+$$\mathbf{f} = \mathbf{x}_2 - \mathbf{x}_0 \quad (2)$$
 
 ## Bend
 

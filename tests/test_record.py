@@ -111,7 +111,8 @@ def stretch(folder: Path, line: str, declared: bool = True) -> Record:
 
 FORCE = r"$$F_{u_1} = -F_{u_0} = k_s (\frac{l_1}{\Delta u} + 1) \quad (3)$$"
 JACOBIAN = (
-    r"$$-\frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial \mathbf{x}_0} = -\frac{\partial \mathbf{F}_{\mathbf{x}_0}}{\partial \mathbf{x}_1}"
+    r"$$-\frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial \mathbf{x}_0} "
+    r"= -\frac{\partial \mathbf{F}_{\mathbf{x}_0}}{\partial \mathbf{x}_1}"
     r" = \frac{k_s}{\Delta u} \mathbf{I} \quad (3)$$"
 )
 IDENTITY = r"$$\frac{\partial l_1}{\partial \mathbf{x}_1} = 2 \frac{1}{l_1} (\mathbf{x}_1 - \mathbf{x}_0)^T \quad (3)$$"

@@ -50,7 +50,7 @@ BEND = r"\frac{2 k_b \theta}{l_1 (u_1 - u_2) \sin \theta}"
         ("Stretch", "F_x1", r"-k_s (\|\mathbf{w}_1\| - 1) \mathbf{d}_2", "index"),
         ("Stretch", "F_x1", r"-k_s (\|\mathbf{w}_1\| - 1) \mathbf{d}_1^T", "transpose"),
         ("Stretch", "dF_u1/dx1", r"\frac{k_s}{\Delta u} \mathbf{w}_1", "transpose"),
-        ("Stretch", "F_x1", r"-\frac{1}{2} k_s (\|\mathbf{w}_1\| - 1) \mathbf{d}_1", "missing factor"),
+        ("Stretch", "F_x1", r"-\frac{1}{2} k_s (\|\mathbf{w}_1\| - 1) \mathbf{d}_1", "extra factor"),
         ("Stretch", "F_x1", r"-k_s (\|\mathbf{w}_1\| - 2) \mathbf{d}_1", "number"),
         ("Stretch", "F_u1", r"\frac{1}{2} k_s (\|\mathbf{w}_1\| - 1)", "power"),
         ("Stretch", "F_u1", r"\frac{1}{2} k_s (\|\mathbf{w}_1\|^3 - 1)", "power"),

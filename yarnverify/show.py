@@ -97,13 +97,12 @@ def _witness_lines(witness: dict[str, Any]) -> list[str]:
 
     point = ", ".join(f"{name} = {text(value)}" for name, value in witness["point"].items())
     exact = ", ".join(f"{name} = {text(value)}" for name, value in witness["hex"].items())
+    lines = [f"    witness    {point}", f"    as floats  {exact}"]
+    if not witness["residual"]:
+        return [*lines, "    there      what is printed has no value"]
     worst = max(range(len(witness["residual"])), key=lambda i: abs(float(witness["residual"][i])))
-    return [
-        f"    witness    {point}",
-        f"    as floats  {exact}",
-        f"    there      printed {witness['printed'][worst]}, true {witness['true'][worst]}"
-        + (f" (entry {worst // 3 + 1},{worst % 3 + 1})" if len(witness["residual"]) == 9 else ""),
-    ]
+    entry = f" (entry {worst // 3 + 1},{worst % 3 + 1})" if len(witness["residual"]) == 9 else ""
+    return [*lines, f"    there      printed {witness['printed'][worst]}, true {witness['true'][worst]}{entry}"]
 
 
 def tally_lines(record: dict[str, Any]) -> list[str]:

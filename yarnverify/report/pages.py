@@ -73,5 +73,5 @@ def _mistakes(found: dict[str, Any], section: str | None) -> list[dict[str, Any]
     for group in groups.values():
         if group["witness"]:
             sizes = [abs(float(value)) for value in group["witness"]["residual"]]
-            group["worst"] = sizes.index(max(sizes))
+            group["worst"] = sizes.index(max(sizes)) if sizes else None
     return list(groups.values())

@@ -117,6 +117,11 @@ class Measure:
         ]
 
 
+def _diff(value: Any, *by: sp.Symbol) -> Any:
+    """Derivative where it exists: that of a sign is zero."""
+    return sp.diff(value, *by).replace(sp.DiracDelta, lambda *args: sp.S.Zero)
+
+
 def _scalar(name: Name) -> sp.Symbol:
     return sp.Symbol(str(name), real=True)
 
@@ -302,10 +307,15 @@ def scalar_tree(value: Any) -> Expr:
     if value.is_Pow:
         if value.exp == sp.Rational(1, 2):
             return Expr("sqrt", (scalar_tree(value.base),))
+        if value.exp.is_Rational and value.exp.q == 2:
+            whole = scalar_tree(value.base ** (value.exp - sp.Rational(1, 2)))
+            return _product([whole, Expr("sqrt", (scalar_tree(value.base),))])
         if value.exp.is_Integer:
             return Expr("pow", (scalar_tree(value.base),), int(value.exp))
     if isinstance(value, sp.sin | sp.cos | sp.tan):
         return Expr("call", (scalar_tree(value.args[0]),), type(value).__name__)
+    if isinstance(value, sp.sign):
+        return scalar_tree(value.args[0]) / Expr("abs", (scalar_tree(value.args[0]),))
     if isinstance(value, sp.Abs):
         return Expr("abs", (scalar_tree(value.args[0]),))
     raise NoMeasuresError
@@ -395,11 +405,11 @@ class Derivation:
     @cached_property
     def slopes(self) -> dict[Measure, Any]:
         """First derivatives of the law by its measures."""
-        return {m: sp.diff(self.law, _scalar(m.symbol)) for m in self.measures}
+        return {m: _diff(self.law, _scalar(m.symbol)) for m in self.measures}
 
     def law_slope(self, *names: Name) -> Any:
         """Derivative of the law by measures and sliding coordinates, as SymPy has it."""
-        return sp.factor_terms(sp.diff(self.law, *(_scalar(name) for name in names)))
+        return sp.factor_terms(_diff(self.law, *(_scalar(name) for name in names)))
 
     def _measure_slope(self, measure: Measure, unknown: Name) -> list[tuple[Any, tuple[Expr, ...]]]:
         return [(a.end(unknown) * value, factors) for a, value, factors in measure.slope if a.end(unknown)]
@@ -407,7 +417,7 @@ class Derivation:
     def gradient(self, unknown: Name, scale: int = 1) -> Expr:
         """Gradient block: a vector for a point, a scalar for a sliding coordinate."""
         if not unknown.bold:
-            return sum_tree([(scale * sp.diff(self.law, _scalar(unknown)), ())])
+            return sum_tree([(scale * _diff(self.law, _scalar(unknown)), ())])
         if self._is_hub(unknown):
             return _minus_sum([Expr("force", value=other) for other in self._others(unknown)])
         terms = []
@@ -423,12 +433,12 @@ class Derivation:
                 pairs = [(o, column) if unknown == row else (row, o) for o in self._others(unknown)]
                 return _minus_sum([Expr("derivative", (Expr("force", value=r),), c) for r, c in pairs])
         if not row.bold and not column.bold:
-            return sum_tree([(scale * sp.diff(self.law, _scalar(row), _scalar(column)), ())])
+            return sum_tree([(scale * _diff(self.law, _scalar(row), _scalar(column)), ())])
         if not (row.bold and column.bold):
             point, sliding = (row, column) if row.bold else (column, row)
             terms = []
             for measure in self.measures:
-                mixed = sp.diff(self.slopes[measure], _scalar(sliding))
+                mixed = _diff(self.slopes[measure], _scalar(sliding))
                 for value, factors in self._measure_slope(measure, point):
                     terms.append((scale * mixed * value, factors if row.bold else _transposed(factors)))
             return sum_tree(terms)
@@ -440,7 +450,7 @@ class Derivation:
                     if ends:
                         terms += [(scale * ends * self.slopes[measure] * v, f) for v, f in measure.bend(a, b)]
             for other in self.measures:
-                second = sp.diff(self.slopes[measure], _scalar(other.symbol))
+                second = _diff(self.slopes[measure], _scalar(other.symbol))
                 for value, left in self._measure_slope(measure, row):
                     for value2, right in self._measure_slope(other, column):
                         terms.append((scale * second * value * value2, (*left, *_transposed(right))))

@@ -156,6 +156,8 @@ class Rationals:
             return root
         if not self.positive(value):
             raise UndefinedError("square root of a negative number")
+        if value in self._roots:
+            return Algebraic(self._roots, {1 << self._roots.index(value): flint.fmpq(1)})
         for count in range(1, len(self._roots) + 1):  # keeps the roots independent
             for chosen in combinations(range(len(self._roots)), count):
                 product, mask = value, 0
@@ -168,6 +170,8 @@ class Rationals:
         return Algebraic(self._roots, {1 << (len(self._roots) - 1): flint.fmpq(1)})
 
     def arccos(self, cosine: Number) -> Number:
+        if self.positive(cosine * cosine - 1):
+            raise UndefinedError("arc cosine of a number above 1 or below -1")
         if cosine in (1, 0, -1):
             return self.pi * {1: 0, 0: flint.fmpq(1, 2), -1: 1}[int(cosine)]
         if -cosine in self._angles:
@@ -175,6 +179,10 @@ class Rationals:
         if cosine not in self._angles:
             self._angles[cosine] = self._rational()
         return self._angles[cosine]
+
+    def knows_angle(self, cosine: Number) -> bool:
+        """Whether an angle was drawn for this cosine, rather than for its negative."""
+        return cosine in self._angles or -cosine not in self._angles
 
     def circle(self, angle: Number) -> tuple[Number, Number]:
         """A rational point of the unit circle, drawn for an angle that no arc cosine explains."""
@@ -209,7 +217,13 @@ class Balls:
         return value.sqrt()
 
     def arccos(self, cosine: Number) -> Number:
-        return cosine.acos()
+        if abs(cosine) > 1:
+            raise UndefinedError("arc cosine of a number above 1 or below -1")
+        if abs(cosine) < 1:
+            return cosine.acos()
+        # the true cosine lies in the ball and in [-1, 1], since an angle is asked for
+        low, high = cosine.lower().max(flint.arb(-1)), cosine.upper().min(flint.arb(1))
+        return low.acos().union(high.acos())
 
     def circle(self, angle: Number) -> tuple[Number, Number]:
         return angle.sin(), angle.cos()
@@ -298,7 +312,13 @@ class Jet:
         return self.chain(one, -one * one, 2 * one * one * one)
 
     def __truediv__(self, other: Any) -> Jet:
-        return self * self._lift(other).inverse()
+        if isinstance(other, Jet):
+            return self * other.inverse()
+        return (
+            Jet(self.value / other)
+            if self.first is None
+            else Jet(self.value / other, self.first / other, self.second / other)
+        )
 
     def __rtruediv__(self, other: Any) -> Jet:
         return self.inverse() * other
@@ -507,7 +527,8 @@ class Evaluation:
         sine, cosine = zero, one
         for _, c in form.values():
             if halves % 2:
-                s, c = self._sqrt((1 - c) / 2), self._sqrt((1 + c) / 2)
+                s, sine_of_whole = self._sqrt((1 - c) / 2), self._sqrt(1 - c * c)
+                c = sine_of_whole / (2 * s)
                 times = int(halves)
             else:
                 s, times = self._sqrt(1 - c * c), int(halves) // 2
@@ -534,7 +555,11 @@ class Evaluation:
             return {"pi": Fraction(1)}
         if op == "call" and expr.value == "arccos":
             cosine = self._value(expr.args[0], jets)
-            return {Jet._lift(cosine).value: (Fraction(1), cosine)}
+            value = Jet._lift(cosine).value
+            self.numbers.arccos(value)
+            if self.numbers.knows_angle(value):
+                return {value: (Fraction(1), cosine)}
+            return {"pi": Fraction(1), -value: (Fraction(-1), -cosine)}  # so that arccos(c) and arccos(-c) share a base
         if op == "number" and expr.value == 0:
             return {}
         scale = Fraction(1)

@@ -168,7 +168,13 @@ def _module(energy: Energy, variant: str, made: Program, document: str, notes: l
             ("gradient", vector, "Gradient, the negative of the force", f"{energy.unit}/m", "Array"),
             ("hessian", full, "Hessian, exactly symmetric", f"{energy.unit}/m^2", "Array"),
             ("evaluate", f"(n,), {vector}, {full}", "Energy, gradient and Hessian at once", units, three),
-            ("packed", f"(n,), {vector}, {upper}", "The same, of the Hessian the upper triangle row by row", units, three),
+            (
+                "packed",
+                f"(n,), {vector}, {upper}",
+                "The same, of the Hessian the upper triangle row by row",
+                units,
+                three,
+            ),
         ),
     )
 

@@ -161,7 +161,7 @@ class Field(Reading):
         return Quotient(self, self._generator[label])
 
     def constant(self, value: Any) -> Quotient:
-        return Quotient(self, self.ring(QQ(value)))
+        return Quotient(self, self.ring(QQ(value.numerator, value.denominator)))
 
     def reduce(self, poly: Poly) -> Poly:
         """Remainder by the relations."""
@@ -241,7 +241,7 @@ class Field(Reading):
             odd = [self.ring.symbols[i].name for i, e in enumerate(poly.LM) if e % 2]
             if all(name in self._positive for name in odd):
                 return 1 if poly.LC > 0 else -1
-        for known in self._known_positive:
+        for known in (*self._known_positive, *self._roots):  # what stands under a root is not negative
             ratio = poly.LC / known.LC
             if poly == known * ratio:
                 return 1 if ratio > 0 else -1
@@ -271,6 +271,11 @@ class Field(Reading):
                 one = self._root(part**2)
             result = result * (one**-power if invert else one**power)
         return result
+
+    @property
+    def root_count(self) -> int:
+        """Number of square roots that have been met."""
+        return len(self._roots)
 
     def _root(self, square: Poly) -> Quotient:
         """A generator for the square root of a polynomial; for p^2 it is the absolute value of p."""
@@ -351,7 +356,10 @@ class Field(Reading):
             if known_cosine is not None:
                 one: tuple[Quotient, Quotient]
                 if n % 2:
-                    one = self.sqrt((1 - known_cosine) / 2), self.sqrt((1 + known_cosine) / 2)
+                    half = self.sqrt(
+                        (1 - known_cosine) / 2
+                    )  # the other one follows: two roots would not be independent
+                    one = half, self.sqrt(1 - known_cosine * known_cosine) / (2 * half)
                 else:
                     n, one = n // 2, (self.sqrt(1 - known_cosine * known_cosine), known_cosine)
                 step = (one[0] if n > 0 else -one[0]), one[1]

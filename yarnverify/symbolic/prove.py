@@ -37,7 +37,8 @@ from yarnverify.symbolic.reading import UnsupportedError, Value, map_value
 from yarnverify.symbolic.tree import FORCE, ZERO, Expr, Name, is_zero
 
 EXACT_STATES = 3  # the second reading's; each is a proof of difference, or one more agreement
-_BALL_BITS = (128, 512, 2048)
+_TRIES = 16 * EXACT_STATES  # states drawn in search of such at which both sides have a value
+_BALL_BITS = (128, 512, 2048, 8192, 32768)
 
 
 class Verdict(StrEnum):
@@ -64,6 +65,19 @@ class Finding:
     reason: str = ""
     witness: Witness | None = None
     undefined: tuple[Name, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """How two sides compare at exact states.
+
+    ``seen`` counts the states at which both had a value; ``differs`` is one at which these were not equal;
+    ``lacks_value`` is one at which only the left side has a value, and why the right one has none.
+    """
+
+    seen: int
+    differs: dict[Name, Any] | None
+    lacks_value: tuple[dict[Name, Any], str] | None = None
 
 
 class Court:
@@ -145,9 +159,8 @@ class Court:
 
     @cached_property
     def exact(self) -> list[Evaluation]:
-        """Evaluations over rationals at the states with the smallest numbers among many."""
-        many = islice(self.maker.states(seed=1), 16 * EXACT_STATES)
-        states = sorted(many, key=_spread)[:EXACT_STATES]
+        """Evaluations over rationals at many states, those with the smallest numbers first."""
+        states = sorted(islice(self.maker.states(seed=1), _TRIES), key=_spread)
         return [Evaluation(self.section, state, Rationals(seed), self.energy) for seed, state in enumerate(states)]
 
     @staticmethod
@@ -160,18 +173,30 @@ class Court:
             a = a * len(b)
         return list(zip(a, b, strict=True))
 
-    def _differs(self, left: Expr, right: Expr) -> tuple[dict[Name, Any] | None, int]:
-        """A state at which the sides differ exactly, and the number of states at which both had a value."""
-        seen = 0
+    def _compare(self, left: Expr, right: Expr) -> _Comparison:
+        """Compare two sides at exact states, until enough were seen at which both have a value."""
+        seen, lacks_value = 0, None
         for evaluation in self.exact:
             try:
                 pairs = self.sides(evaluation, left, right)
-            except UndefinedError:
+            except UndefinedError as error:
+                if lacks_value is None and not self._undefined_at(evaluation, left):
+                    lacks_value = dict(evaluation.state), str(error)
                 continue
             seen += 1
             if any(a != b for a, b in pairs):
-                return dict(evaluation.state), seen
-        return None, seen
+                return _Comparison(seen, dict(evaluation.state))
+            if seen == EXACT_STATES:
+                break
+        return _Comparison(seen, None, lacks_value)
+
+    @staticmethod
+    def _undefined_at(evaluation: Evaluation, expr: Expr) -> bool:
+        try:
+            evaluation.value(expr)
+        except UndefinedError:
+            return True
+        return False
 
     def certify(self, state: dict[Name, Any], left: Expr, right: Expr) -> Witness | None:
         """The witness at a state, if balls of some precision show that the sides differ there."""
@@ -199,19 +224,32 @@ class Court:
         kinds = [self.section.type_of(side) for side in (left, right)]
         if kinds[0] is not kinds[1] and not (is_zero(left) or is_zero(right)):
             return Finding(Verdict.REFUTED, f"a {kinds[0].value} cannot equal a {kinds[1].value}")
+        equal: bool | None
         try:
             equal = self._equal_normal(left, right)
         except UnsupportedError as error:
             return Finding(Verdict.UNDECIDED, str(error))
         except ZeroDivisionError:
-            return Finding(Verdict.UNDECIDED, "a denominator is zero everywhere")
-        state, seen = self._differs(left, right)
-        if equal and state is None and seen:
+            equal = None  # a denominator is identically zero
+        compared = self._compare(left, right)
+        state = compared.differs
+        if equal and state is None and compared.seen:
             return Finding(Verdict.PROVED)
-        if not seen:
+        if not compared.seen and compared.lacks_value is not None:
+            where, why = compared.lacks_value
+            return Finding(Verdict.REFUTED, f"what is printed has no value: {why}", Witness(where, (), ()))
+        if not compared.seen:
             return Finding(Verdict.UNDECIDED, "no exact state was found at which both sides have a value")
         if equal:
             return Finding(Verdict.INCONSISTENT, "equal as normal forms, different at an exact state")
+        if equal is None:
+            return Finding(
+                Verdict.INCONSISTENT, "a denominator is zero as a normal form, and has a value at an exact state"
+            )
+        if state is None and self.field.root_count > 1:
+            return Finding(
+                Verdict.UNDECIDED, "equal at every exact state tried, but the square roots could not be settled"
+            )
         if state is None:
             return Finding(Verdict.INCONSISTENT, "different as normal forms, equal at every exact state tried")
         witness = self.certify(state, left, right)
@@ -424,8 +462,9 @@ class _Appeal:
         if finding.undefined:  # its own symbols, or those of a definition that it uses
             own = any(section.undefined(side, follow=False) for side in (claim.left, claim.right))
             return Judged(section, claim, kind, finding, self.court, () if own else roots)
-        explained = self.fair.judge(claim.left, claim.right).verdict is Verdict.PROVED
-        return Judged(section, claim, kind, finding, self.fair, roots if explained else ())
+        fair = self.fair.reaching([claim.left, claim.right])
+        explained = fair.judge(claim.left, claim.right).verdict is Verdict.PROVED
+        return Judged(section, claim, kind, finding, fair, roots if explained else ())
 
     def _roots(self, claim: Claim) -> tuple[str, ...]:
         """Equations to blame: the refuted energy, and refuted definitions that the claim or the energy uses."""

@@ -175,6 +175,8 @@ def _witness(judged: Judged) -> dict[str, Any] | None:
         label = name.label if judged.section.is_unknown(name) else str(name)
         point[label] = texts if name.bold else texts[0]
         hexadecimal[label] = hexes if name.bold else hexes[0]
+    if not witness.right:
+        return {"point": point, "hex": hexadecimal, "printed": ["undefined"], "true": [], "residual": []}
     return {
         "point": point,
         "hex": hexadecimal,

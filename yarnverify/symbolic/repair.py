@@ -141,8 +141,8 @@ class Workshop:
         kind = self._type(node)
         if kind is None:
             return
-        yield from self._symbol_changes(node)
         yield 1, "sign", node, _negated(node)
+        yield from self._symbol_changes(node)
         if kind in (Type.VECTOR, Type.COVECTOR):
             after = node.args[0] if node.op == "transpose" else Expr("transpose", (node,))
             yield 1, "transpose", node, after
@@ -152,7 +152,7 @@ class Workshop:
                 {0, 1, 2, 3, 4, 6, 8, value - 1, value + 1} - {value}, key=lambda n: (abs(n - value), n)
             ):
                 if other >= 0:
-                    yield 2, "number", node, number(other)
+                    yield 1, "number", node, number(other)
         if node.op == "pow":
             assert isinstance(node.value, int)
             for other in (node.value - 1, node.value + 1, node.value + 2, node.value - 2, -node.value):
@@ -169,7 +169,8 @@ class Workshop:
             for index in range(len(node.args)):
                 rest = (*node.args[:index], *node.args[index + 1 :])
                 if self._type(node.args[index]) in (Type.SCALAR, Type.MATRIX):
-                    yield 3, "extra factor", node, rest[0] if len(rest) == 1 else replace(node, args=rest)
+                    cost = 1 if _is_number(node.args[index]) else 3
+                    yield cost, "extra factor", node, rest[0] if len(rest) == 1 else replace(node, args=rest)
             for index in range(len(node.args) - 1):
                 swapped = (*node.args[:index], node.args[index + 1], node.args[index], *node.args[index + 2 :])
                 yield 3, "order of factors", node, replace(node, args=swapped)
@@ -188,8 +189,10 @@ class Workshop:
             return
         name = node.name
         if re.fullmatch(r"\d+", name.sub):
+            definition = self.section.definition(name) if node.op == "symbol" else None
             for sub in self._indices:
-                if sub != name.sub:
+                base = definition is not None and definition.index and sub == "0"  # l_0 and the like mean nothing
+                if sub != name.sub and not base:
                     yield 1, "index", node, replace(node, value=name.with_sub(sub))
         if node.op == "symbol":
             kind = self.section.lookup(name)
@@ -199,7 +202,7 @@ class Workshop:
 
     def _factors(self, node: Expr, kind: Type) -> Iterator[tuple[int, str, Expr, Expr]]:
         """A factor too few: numbers, and the scalars and matrices that the section knows."""
-        for value in (2, 3, 4):
+        for value in (2, 3, 4) if node.op != "number" else ():
             yield 2, "missing factor", node, _times(number(value), node)
             yield 2, "missing factor", node, Expr("frac", (node, number(value)))
         if node.op in {"number", "neg", "add", "force", "derivative", "energy"}:
@@ -249,6 +252,10 @@ class Workshop:
 def _is_angle(section: Section, name: Name) -> bool:
     meaning = section.meaning(name)
     return meaning is not None and any(node.op == "call" and node.value == "arccos" for node in meaning.walk())
+
+
+def _is_number(node: Expr) -> bool:
+    return all(part.op in {"number", "frac"} for part in node.walk())
 
 
 def _negated(node: Expr) -> Expr:
