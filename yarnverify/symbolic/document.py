@@ -257,9 +257,9 @@ def _sections(source: Source, items: list[Heading | Relation]) -> tuple[Section,
     """Group relations under headings: a lone top heading is the title, deeper headings belong to the section above."""
     headings = [item for item in items if isinstance(item, Heading)]
     titles = [h for h in headings if h.level == headings[0].level]
-    has_title = (
-        len(titles) == 1 and any(h.level > titles[0].level for h in headings) and not _has_energy(items, titles[0])
-    )
+    deeper = [h for h in headings if h.level > titles[0].level] if titles else []
+    own_energy = bool(titles) and _has_energy(items, titles[0]) and not any(_has_energy(items, h) for h in deeper)
+    has_title = len(titles) == 1 and bool(deeper) and not own_energy
     rest = [h for h in headings if not (has_title and h is titles[0])]
     level = min((h.level for h in rest), default=0)
     shared = Section("", 0)

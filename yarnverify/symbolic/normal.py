@@ -24,7 +24,7 @@ from itertools import combinations
 from math import prod
 from typing import Any
 
-from sympy import QQ
+from sympy import QQ, Symbol
 from sympy.polys.orderings import lex
 from sympy.polys.rings import ring
 
@@ -137,7 +137,7 @@ class Field(Reading):
         labels += [f"length({name.label})" for name in self._points[1:]]
         labels += [f"{name.label}.{axis}" for name in self._points[:1] for axis in "xyz"]
         labels += [str(name) for name in self._scalars]
-        self.ring, *generators = ring(labels, QQ, lex)
+        self.ring, *generators = ring([Symbol(label) for label in labels], QQ, lex)  # as text, SymPy would split names
         self._generator = dict(zip(labels, generators, strict=True))
         self._position = {label: i for i, label in enumerate(labels)}
         self._spare = iter(labels[:_SPARE][::-1])  # a later atom is larger than those in its square

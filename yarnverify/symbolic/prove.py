@@ -457,7 +457,7 @@ class _Appeal:
     def judged(self, claim: Claim, kind: str, finding: Finding) -> Judged:
         section = self.court.section
         roots = self._roots(claim)
-        if finding.verdict is not Verdict.REFUTED or not roots:
+        if finding.verdict not in (Verdict.REFUTED, Verdict.UNDECIDED) or not roots:
             return Judged(section, claim, kind, finding, self.court)
         if finding.undefined:  # its own symbols, or those of a definition that it uses
             own = any(section.undefined(side, follow=False) for side in (claim.left, claim.right))
