@@ -182,8 +182,10 @@ STATE: dict[Name, Any] = {
     POINTS[0]: (Fraction(0), Fraction(0), Fraction(0)),
     POINTS[1]: (Fraction(2), Fraction(0), Fraction(0)),
     POINTS[2]: (Fraction(3), Fraction(4), Fraction(0)),
-    U[0]: Fraction(5, 4), U[1]: Fraction(-1, 2), **dict(zip(PARAMETERS, (Fraction(3), Fraction(1, 4), Fraction(2)), strict=True)),
-}  # fmt: skip
+    U[0]: Fraction(5, 4),
+    U[1]: Fraction(-1, 2),
+    **dict(zip(PARAMETERS, (Fraction(3), Fraction(1, 4), Fraction(2)), strict=True)),
+}
 MADE = section()
 
 

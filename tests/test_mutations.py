@@ -33,7 +33,7 @@ CORRECTIONS = {  # as derivations/errata.toml has them, written out by hand
     r"+ \cos \theta \mathbf{P}_1 +": r"- \cos \theta \mathbf{P}_1 +",
     r"+ \cos \theta \mathbf{P}_2 +": r"- \cos \theta \mathbf{P}_2 +",
 }
-PER_KIND = 4  # mutants of one kind drawn from one equation
+PER_KIND = 3  # mutants of one kind drawn from one equation
 
 
 # -- the reference ----------------------------------------------------------------------------------------------------

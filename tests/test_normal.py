@@ -97,7 +97,7 @@ def test_a_denominator_that_is_zero_everywhere_is_seen(formula: str) -> None:
 
 # -- roots, absolute values, angles -----------------------------------------------------------------------------------
 
-C = r"\mathbf{x}_1^T \mathbf{x}_2"  # anything; no angle of it is special
+C = "b"
 T = rf"\arccos({C})"
 D1, D2 = (rf"\frac{{\mathbf{{x}}_{i} - \mathbf{{x}}_0}}{{\|\mathbf{{x}}_{i} - \mathbf{{x}}_0\|}}" for i in "12")
 TURN = rf"\arccos(-({D1})^T {D2})"
