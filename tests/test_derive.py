@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from yarnverify.symbolic.court import Court, Verdict
 from yarnverify.symbolic.declare import (
     Declarations,
     Energy,
@@ -19,7 +20,6 @@ from yarnverify.symbolic.declare import (
     unit,
 )
 from yarnverify.symbolic.derive import Derivation, derive_declared
-from yarnverify.symbolic.prove import Court, Verdict
 from yarnverify.symbolic.tree import FORCE, PI, ZERO, Expr
 
 

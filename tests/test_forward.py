@@ -14,18 +14,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from yarnverify.symbolic.document import Section
-from yarnverify.symbolic.forward import (
-    Algebraic,
-    Balls,
-    Evaluation,
-    Floats,
-    Jet,
-    Rationals,
-    StateMaker,
-    UndefinedError,
-    entries,
-)
+from yarnverify.symbolic.forward import Evaluation, entries
+from yarnverify.symbolic.jets import Jet
+from yarnverify.symbolic.numbers import Algebraic, Balls, Floats, Rationals, UndefinedError
 from yarnverify.symbolic.reader import read_formula
+from yarnverify.symbolic.states import StateMaker
 from yarnverify.symbolic.tree import Expr, Name
 
 from .test_normal import PARAMETERS, POINTS, TURN, T, U, section

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from yarnverify import kernels
 from yarnverify.generation import DEFAULT_VARIANT
 from yarnverify.symbolic.derive import declared_section
-from yarnverify.symbolic.forward import Balls, Evaluation
+from yarnverify.symbolic.forward import Evaluation
+from yarnverify.symbolic.numbers import Balls
 from yarnverify.symbolic.tree import Name
 
 ENERGIES = ("stretch", "bending", "shear", "parallel_contact")

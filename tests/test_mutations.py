@@ -19,10 +19,11 @@ import pytest
 from yarnverify.errors import InputError
 from yarnverify.library import shelf_for
 from yarnverify.source import Source
+from yarnverify.symbolic.court import Court, Verdict
 from yarnverify.symbolic.declare import Declarations
 from yarnverify.symbolic.document import Document, Section
 from yarnverify.symbolic.latex import latex
-from yarnverify.symbolic.prove import Court, Verdict, declared_meaning, definition_claim, read_with
+from yarnverify.symbolic.prove import declared_meaning, definition_claim, read_with
 from yarnverify.symbolic.reader import read_formula
 from yarnverify.symbolic.record import prove_source
 from yarnverify.symbolic.tree import Expr, Name, ShapeError, Type, is_zero, number

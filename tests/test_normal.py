@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from yarnverify.source import Source
+from yarnverify.symbolic.court import Court, Verdict
 from yarnverify.symbolic.declare import assumptions
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.normal import Field, Quotient
-from yarnverify.symbolic.prove import Court, Verdict
 from yarnverify.symbolic.reader import parse, read_formula
 from yarnverify.symbolic.reading import UnsupportedError
 from yarnverify.symbolic.tree import ONE, ZERO, Expr, Name, number, symbol

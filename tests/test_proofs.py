@@ -13,13 +13,15 @@ import pytest
 
 from yarnverify.library import Shelf, errata, shelf_for
 from yarnverify.source import Source
+from yarnverify.symbolic.court import Court, Verdict, _Comparison
 from yarnverify.symbolic.declare import Declarations
 from yarnverify.symbolic.document import Section
-from yarnverify.symbolic.forward import Evaluation, UndefinedError
-from yarnverify.symbolic.prove import Court, Verdict, _Comparison, hexadecimal, read_with, try_document
+from yarnverify.symbolic.forward import Evaluation
+from yarnverify.symbolic.numbers import UndefinedError
+from yarnverify.symbolic.prove import read_with, try_document
 from yarnverify.symbolic.reader import read_formula
 from yarnverify.symbolic.reading import UnsupportedError
-from yarnverify.symbolic.record import prove_source
+from yarnverify.symbolic.record import hexadecimal, prove_source
 from yarnverify.symbolic.tree import Expr, Name
 
 Record = dict[str, Any]

@@ -6,9 +6,10 @@ import pytest
 
 from yarnverify.library import Shelf
 from yarnverify.source import Source
+from yarnverify.symbolic.court import Court, Verdict
 from yarnverify.symbolic.declare import Declarations
 from yarnverify.symbolic.document import Section
-from yarnverify.symbolic.prove import Court, Verdict, read_with
+from yarnverify.symbolic.prove import read_with
 from yarnverify.symbolic.reader import read_formula
 from yarnverify.symbolic.record import prove_source
 from yarnverify.symbolic.repair import Repair, Workshop, chain_latex, describe

@@ -2,13 +2,16 @@
 
 In the order of work::
 
-    tree, latex      the typed expression tree, and its way back to LaTeX
-    reader           LaTeX text -> trees with positions               (grammar.lark)
-    document         trees -> definitions, energies, claims per section
-    declare          energies as a person declares them in derivations/*.py
-    normal           reading 1: exact normal forms and derivatives     (SymPy polynomials)
-    forward          reading 2: forward second-order differentiation over exact rationals, balls or floats
-    prove, repair    a verdict on every claim; the smallest true change of a refuted one
-    measures, derive gradients and Hessians in vector form, by the chain rule over proven measures
-    emit             NumPy modules                                     (reading 3)
+    tree, latex, plain          the typed expression tree, and its ways back to LaTeX and to text
+    reader                      LaTeX text -> trees with positions                 (grammar.lark)
+    declare                     energies as a person declares them in derivations/*.py
+    document                    trees -> definitions, assumptions, energies and claims per section
+    reading, normal             reading 1: exact normal forms and derivatives      (SymPy polynomials)
+    numbers, jets, forward      reading 2: forward differentiation over exact rationals, balls or doubles
+    states                      where reading 2 looks
+    court, prove                a verdict on two sides; the trial of a document
+    repair, record              the smallest true change of a refuted chain; all that was found, as JSON
+    measures, laws, scalars     lengths and angles; energies as laws of them; SymPy scalars back to trees
+    derive, explain             gradients and Hessians in vector form, proved; the derivation step by step
+    emit, modules               reading 3: straight-line NumPy programs, and the modules that hold them
 """

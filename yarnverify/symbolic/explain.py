@@ -7,19 +7,13 @@ from typing import Any
 
 from yarnverify.errors import InputError
 from yarnverify.library import derivations
+from yarnverify.symbolic.court import Court, Verdict
 from yarnverify.symbolic.declare import Declarations, Energy, load_declarations
-from yarnverify.symbolic.derive import (
-    Derivation,
-    Measure,
-    Segment,
-    declared_section,
-    derive_declared,
-    scalar_tree,
-    sum_tree,
-)
+from yarnverify.symbolic.derive import Derivation, declared_section, derive_declared
 from yarnverify.symbolic.latex import latex, name_latex
+from yarnverify.symbolic.measures import Measure, Segment
 from yarnverify.symbolic.plain import name_plain, plain
-from yarnverify.symbolic.prove import Court, Verdict
+from yarnverify.symbolic.scalars import scalar_tree, sum_tree
 from yarnverify.symbolic.tree import FORCE, Expr, Name
 
 Step = dict[str, Any]

@@ -10,11 +10,12 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from yarnverify.errors import NotRunError
 from yarnverify.source import load
+from yarnverify.symbolic.court import Court, Verdict
 from yarnverify.symbolic.declare import Declarations, Energy, load_declarations
 from yarnverify.symbolic.derive import declared_section, derive_declared
 from yarnverify.symbolic.document import Claim, Document, Section, block_of
 from yarnverify.symbolic.emit import Program, dof_labels, identifier, plain_program, program, statements, used_functions
-from yarnverify.symbolic.prove import Court, Verdict, read_with
+from yarnverify.symbolic.prove import read_with
 from yarnverify.symbolic.reading import UnsupportedError
 from yarnverify.symbolic.repair import Workshop
 from yarnverify.symbolic.tree import FORCE, Expr

@@ -13,12 +13,14 @@ import numpy as np
 
 from yarnverify.library import Shelf
 from yarnverify.source import Source
+from yarnverify.symbolic.court import Verdict
 from yarnverify.symbolic.declare import Declarations, load_declarations
 from yarnverify.symbolic.derive import derive
 from yarnverify.symbolic.document import Section, block_of, instantiate
-from yarnverify.symbolic.forward import Balls, Evaluation, UndefinedError, entries
+from yarnverify.symbolic.forward import Evaluation, entries
 from yarnverify.symbolic.latex import latex
-from yarnverify.symbolic.prove import Completeness, Judged, Trial, Verdict, read_with, try_document
+from yarnverify.symbolic.numbers import Balls, UndefinedError
+from yarnverify.symbolic.prove import Completeness, Judged, Trial, read_with, try_document
 from yarnverify.symbolic.repair import Repair, Workshop, chain_latex, describe
 from yarnverify.symbolic.tree import FORCE, Expr, Name
 
@@ -168,25 +170,26 @@ def _witness(judged: Judged) -> dict[str, Any] | None:
     if witness is None:
         return None
     point: dict[str, Any] = {}
-    hexadecimal: dict[str, Any] = {}
+    floats: dict[str, Any] = {}
     for name, value in witness.state.items():
         parts = value if isinstance(value, tuple) else (value,)
-        texts, hexes = [str(part) for part in parts], [_hexadecimal(part) for part in parts]
+        texts, hexes = [str(part) for part in parts], [hexadecimal(part) for part in parts]
         label = name.label if judged.section.is_unknown(name) else str(name)
         point[label] = texts if name.bold else texts[0]
-        hexadecimal[label] = hexes if name.bold else hexes[0]
+        floats[label] = hexes if name.bold else hexes[0]
     if not witness.right:
-        return {"point": point, "hex": hexadecimal, "printed": ["undefined"], "true": [], "residual": []}
+        return {"point": point, "hex": floats, "printed": ["undefined"], "true": [], "residual": []}
     return {
         "point": point,
-        "hex": hexadecimal,
+        "hex": floats,
         "printed": [_digits(value) for value in witness.right],
         "true": [_digits(value) for value in witness.left],
         "residual": [_digits(r - t) for r, t in zip(witness.right, witness.left, strict=True)],
     }
 
 
-def _hexadecimal(value: Fraction) -> str:
+def hexadecimal(value: Fraction) -> str:
+    """A rational as a hexadecimal float."""
     number = float(value)
     if Fraction(number) != value:
         raise AssertionError(f"{value} is not a double: states are drawn so that they are")

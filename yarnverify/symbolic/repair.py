@@ -15,10 +15,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
+from yarnverify.symbolic.court import Court, Verdict
 from yarnverify.symbolic.document import Section, block_of
-from yarnverify.symbolic.forward import Evaluation, Floats, UndefinedError
+from yarnverify.symbolic.forward import Evaluation
 from yarnverify.symbolic.latex import latex, name_latex
-from yarnverify.symbolic.prove import Court, Verdict
+from yarnverify.symbolic.numbers import Floats, UndefinedError
 from yarnverify.symbolic.tree import ONE, PI, Expr, Name, ShapeError, Type, number, rebuild
 
 Sides = list[tuple[Expr, Expr]]

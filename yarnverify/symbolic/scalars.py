@@ -1,0 +1,118 @@
+"""SymPy scalars back to trees, written as a person would write them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import sympy as sp
+
+from yarnverify.symbolic.measures import NoMeasuresError, scalar_name
+from yarnverify.symbolic.tree import ONE, PI, ZERO, Expr, number
+
+
+def scalar_tree(value: Any) -> Expr:
+    """A SymPy scalar as a tree, fractions written as fractions."""
+    if value.is_Symbol:
+        return Expr("symbol", value=scalar_name(value))
+    if value.is_Rational:
+        return number(sp.Rational(value).p) if value.q == 1 else _fraction(number(int(value.p)), number(int(value.q)))
+    if value == sp.pi:
+        return PI
+    if value.is_Add:
+        terms = [scalar_tree(term) for term in sorted(value.args, key=_term_key)]
+        return Expr("add", tuple(terms))
+    if value.is_Mul or value.is_Pow:
+        value = _upright(value)
+        above, below = _split(value)
+        if below != 1:
+            return _fraction(scalar_tree(above), scalar_tree(below))
+    if value.is_Mul:
+        content, rest = value.as_coeff_Mul()
+        if content < 0:
+            return -scalar_tree(-value)
+        factors = [number(int(content))] if content != 1 else []
+        return _product([*factors, *(scalar_tree(f) for f in sorted(sp.Mul.make_args(rest), key=_factor_key))])
+    if value.is_Pow:
+        if value.exp == sp.Rational(1, 2):
+            return Expr("sqrt", (scalar_tree(value.base),))
+        if value.exp.is_Rational and value.exp.q == 2:
+            whole = scalar_tree(value.base ** (value.exp - sp.Rational(1, 2)))
+            return _product([whole, Expr("sqrt", (scalar_tree(value.base),))])
+        if value.exp.is_Integer:
+            return Expr("pow", (scalar_tree(value.base),), int(value.exp))
+    if isinstance(value, sp.sin | sp.cos | sp.tan):
+        return Expr("call", (scalar_tree(value.args[0]),), type(value).__name__)
+    if isinstance(value, sp.sign):
+        return scalar_tree(value.args[0]) / Expr("abs", (scalar_tree(value.args[0]),))
+    if isinstance(value, sp.Abs):
+        return Expr("abs", (scalar_tree(value.args[0]),))
+    raise NoMeasuresError
+
+
+def _split(value: Any) -> tuple[Any, Any]:
+    """Numerator and denominator, factors as they are."""
+    above, below = [], []
+    for factor in sp.Mul.make_args(value):
+        if factor.is_Rational:
+            above.append(sp.Integer(factor.p))
+            below.append(sp.Integer(factor.q))
+        elif factor.is_Pow and factor.exp.is_Rational and factor.exp < 0:
+            below.append(sp.Pow(factor.base, -factor.exp))
+        else:
+            above.append(factor)
+    return sp.Mul(*above), sp.Mul(*below, evaluate=len(below) < 2 or not any(b.is_Add for b in below))
+
+
+def _upright(value: Any) -> Any:
+    """A product in which differences such as ``u_0 - u_1`` stand as ``u_1 - u_0``."""
+    flipped, factors = False, []
+    for factor in sp.Mul.make_args(value):
+        base, exponent = factor.as_base_exp()
+        signs = {term.as_coeff_Mul() for term in base.args} if base.is_Add and len(base.args) == 2 else set()
+        if exponent.is_Integer and {sign for sign, _ in signs} == {1, -1} and all(s.is_Symbol for _, s in signs):
+            (first,), (second,) = ([scalar_name(s) for sign, s in signs if sign == want] for want in (1, -1))
+            if first.base == second.base and first.sub < second.sub:
+                flipped ^= bool(exponent % 2)
+                factor = sp.Pow(sp.Add(*[-term for term in base.args]), exponent)
+        factors.append(factor)
+    return -sp.Mul(*factors) if flipped else value if factors == list(sp.Mul.make_args(value)) else sp.Mul(*factors)
+
+
+def _fraction(above: Expr, below: Expr) -> Expr:
+    if above.op == "neg":
+        return -_fraction(above.args[0], below)
+    return above / below
+
+
+def _factor_key(value: Any) -> tuple[int, str]:
+    """Parameters, then lengths and coordinates, then functions, then sums."""
+    text = str(value)
+    order = 3 if value.is_Add or (value.is_Pow and value.base.is_Add) else 2 if value.args and not value.is_Pow else 1
+    return (-1 if text[0] == "k" else 0 if len(text) == 1 else order), text
+
+
+def _term_key(value: Any) -> tuple[bool, str]:
+    content, rest = value.as_coeff_Mul()
+    return bool(content < 0) or rest.is_number, str(rest)
+
+
+def _product(factors: list[Expr]) -> Expr:
+    factors = [f for f in factors if f != ONE] or [ONE]
+    return factors[0] if len(factors) == 1 else Expr("mul", tuple(factors))
+
+
+def sum_tree(terms: Iterable[tuple[Any, tuple[Expr, ...]]]) -> Expr:
+    """``sum scalar * factors``; terms with the same factors are joined, and a scalar shared by all is taken out."""
+    joined: dict[tuple[Expr, ...], Any] = {}
+    for value, factors in terms:
+        joined[factors] = joined.get(factors, sp.S.Zero) + value
+    kept = [(_upright(sp.factor_terms(value)), factors) for factors, value in joined.items() if value != 0]
+    if not kept:
+        return ZERO
+    trees = []
+    for value, factors in kept:
+        negative = value.as_coeff_Mul()[0] < 0
+        body = _product([scalar_tree(-value if negative else value), *factors])
+        trees.append(-body if negative else body)
+    return trees[0] if len(trees) == 1 else Expr("add", tuple(trees))
