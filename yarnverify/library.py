@@ -9,6 +9,7 @@ import hashlib
 import json
 import os
 import re
+import sys
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -34,6 +35,13 @@ class Shelf:
     folder: Path | None
     document: str
     how: str
+    beside: Path | None = None
+
+    @property
+    def errata(self) -> Path | None:
+        """Where accepted errata are recorded: with the declarations, or beside a document that is judged by itself."""
+        place = self.folder or self.beside
+        return None if place is None else place / "errata.toml"
 
 
 @dataclass(frozen=True)
@@ -69,7 +77,7 @@ def shelf_for(document: Path, text: str, choice: str | None = None) -> Shelf:
         displays are displays of it), else none.
     """
     if choice == "none":
-        return Shelf(None, document.name, "by itself alone")
+        return Shelf(None, document.name, "by itself alone", document.parent)
     if choice is not None:
         folder = Path(choice)
         names = _declared_documents(folder)
@@ -85,7 +93,7 @@ def shelf_for(document: Path, text: str, choice: str | None = None) -> Shelf:
         return Shelf(
             derivations(), name, f"by the energies declared for {name}, with which it shares {common} displays"
         )
-    return Shelf(None, document.name, "by itself alone: no declared energies belong to it")
+    return Shelf(None, document.name, "by itself alone: no declared energies belong to it", document.parent)
 
 
 def _nearest(folder: Path, names: set[str], text: str) -> tuple[int, str]:
@@ -111,10 +119,8 @@ def errata(shelf: Shelf) -> tuple[Erratum, ...]:
     InputError
         Where the file is not TOML, or an entry lacks its equation, change or reason.
     """
-    if shelf.folder is None:
-        return ()
-    path = shelf.folder / "errata.toml"
-    if not path.is_file():
+    path = shelf.errata
+    if path is None or not path.is_file():
         return ()
     try:
         entries = tomllib.loads(path.read_text(encoding="utf-8")).get("erratum", [])
@@ -140,8 +146,9 @@ def fingerprint(parts: Iterable[bytes | Path]) -> str:
     import importlib.metadata
 
     digest = hashlib.sha256()
-    own = sorted((Path(__file__).parent / "symbolic").glob("*"))
-    for part in [*parts, *(path for path in own if path.suffix in {".py", ".lark"})]:
+    package = Path(__file__).parent
+    own = sorted([*package.glob("*.py"), *(package / "symbolic").glob("*.py"), *(package / "symbolic").glob("*.lark")])
+    for part in [*parts, sys.version.encode(), *own]:
         data = part.read_bytes() if isinstance(part, Path) else part
         digest.update(len(data).to_bytes(8, "big") + data)
     for name in ("sympy", "python-flint", "lark"):

@@ -112,17 +112,21 @@ def tally_lines(record: dict[str, Any]) -> list[str]:
         f"{count} {verdict}" for verdict, count in tally.items() if count or verdict in ("proved", "refuted")
     )
     numbers = {claim["equation"] for claim in record["claims"] if not claim["equation"].startswith("line")}
-    lines = [f"{total} claims in {len(numbers)} of {len(record['equations'])} numbered equations: {counts}."]
+    claims = "1 claim" if total == 1 else f"{total} claims"
+    lines = [f"{claims} in {len(numbers)} of {len(record['equations'])} numbered equations: {counts}."]
     if record["given"]:
         names = ", ".join(f"{g['block']} ({g['equation']})" for g in record["given"])
         lines.append(f"Taken as given, since nothing declared says what they should be: {names}.")
     sections = [part["section"] for part in record["completeness"] if part["missing"]]
+    unknown = [block for part in record["completeness"] for block in part["unknown"]]
     listed = sum(len(part["listed"]) for part in record["completeness"])
     lines.append(
         f"Lists of non-zero forces and Jacobians: incomplete in {', '.join(sections)}."
         if sections
-        else f"Lists of non-zero forces and Jacobians: complete, {listed} blocks."
+        else f"Lists of non-zero forces and Jacobians: complete, {listed} block{'s' * (listed != 1)}."
     )
+    if unknown:
+        lines.append(f"Not examined, being too large: {', '.join(unknown)}.")
     errata = record["errata"]
     for kind, what in (
         ("accepted", "Accepted errata"),

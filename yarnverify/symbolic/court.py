@@ -94,8 +94,7 @@ class Court:
         names = {n for n in names if section.is_unknown(n) or n in section.parameters} | assumed
         self.names = sorted(names, key=lambda n: (not n.bold, n.base, n.sub))
         declared = section.declared
-        positive = {p.name for p in declared.parameters if p.positive} if declared else set(section.parameters)
-        self.positive = frozenset(positive)
+        self.positive = frozenset(p.name for p in declared.parameters if p.positive) if declared else frozenset()
 
     def reaching(self, trees: Iterable[Expr]) -> Court:
         """This court, or a larger one if the trees hold symbols that it does not."""
@@ -132,16 +131,25 @@ class Court:
             self._blocks[expr] = found
         return self._blocks[expr]
 
+    def is_zero(self, block: Expr) -> bool | None:
+        """Whether a true block is zero everywhere; None if nothing could tell."""
+        for evaluation in self.exact[:EXACT_STATES]:
+            try:
+                if any(part != 0 for part in entries(evaluation.value(block))):
+                    return False  # one exact state is enough for that
+            except UndefinedError:
+                continue
+        try:
+            return all(q.is_zero for q in flat(self.block(block)))
+        except (UnsupportedError, ZeroDivisionError):
+            return None
+
     def normal(self, expr: Expr) -> Value:
         return self.field.value(expr, self.block)
 
     def _equal_normal(self, left: Expr, right: Expr) -> bool:
-        a, b = flat(self.normal(left)), flat(self.normal(right))
-        if is_zero(right):
-            b = b * len(a)
-        if is_zero(left):
-            a = a * len(b)
-        return all((p - q).is_zero for p, q in zip(a, b, strict=True))
+        pairs = _paired(left, right, flat(self.normal(left)), flat(self.normal(right)))
+        return all((p - q).is_zero for p, q in pairs)
 
     # -- second reading
 
@@ -158,12 +166,7 @@ class Court:
     @staticmethod
     def sides(evaluation: Evaluation, left: Expr, right: Expr) -> list[tuple[Any, Any]]:
         """Components of both sides at one state."""
-        a, b = entries(evaluation.value(left)), entries(evaluation.value(right))
-        if is_zero(right):
-            b = b * len(a)
-        if is_zero(left):
-            a = a * len(b)
-        return list(zip(a, b, strict=True))
+        return _paired(left, right, entries(evaluation.value(left)), entries(evaluation.value(right)))
 
     def _compare(self, left: Expr, right: Expr) -> _Comparison:
         """Compare two sides at exact states, until enough were seen at which both have a value."""
@@ -217,10 +220,11 @@ class Court:
         if kinds[0] is not kinds[1] and not (is_zero(left) or is_zero(right)):
             return Finding(Verdict.REFUTED, f"a {kinds[0].value} cannot equal a {kinds[1].value}")
         equal: bool | None
+        unsupported = ""
         try:
             equal = self._equal_normal(left, right)
         except UnsupportedError as error:
-            return Finding(Verdict.UNDECIDED, str(error))
+            equal, unsupported = None, str(error)
         except ZeroDivisionError:
             equal = None  # a denominator is identically zero
         compared = self._compare(left, right)
@@ -228,13 +232,16 @@ class Court:
         if equal and state is None and compared.seen:
             return Finding(Verdict.PROVED)
         if not compared.seen and compared.lacks_value is not None:
-            where, why = compared.lacks_value
-            return Finding(Verdict.REFUTED, f"what is printed has no value: {why}", Witness(where, (), ()))
+            at, why = compared.lacks_value
+            return Finding(Verdict.REFUTED, f"what is printed has no value: {why}", Witness(at, (), ()))
         if not compared.seen:
-            return Finding(Verdict.UNDECIDED, "no exact state was found at which both sides have a value")
+            what = "both sides have a value at no state tried" if self.exact else "no state satisfies the assumptions"
+            return Finding(Verdict.UNDECIDED, what)
+        if unsupported and state is None:
+            return Finding(Verdict.UNDECIDED, f"{unsupported}; equal at the {compared.seen} exact states tried")
         if equal:
             return Finding(Verdict.INCONSISTENT, "equal as normal forms, different at an exact state")
-        if equal is None:
+        if equal is None and not unsupported:
             return Finding(
                 Verdict.INCONSISTENT, "a denominator is zero as a normal form, and has a value at an exact state"
             )
@@ -255,6 +262,15 @@ class Court:
 def undefined_symbols(missing: tuple[Name, ...]) -> Finding:
     symbols = ", ".join(name_latex(name) for name in missing)
     return Finding(Verdict.REFUTED, f"undefined symbol {symbols}", undefined=missing)
+
+
+def _paired(left: Expr, right: Expr, a: list[Any], b: list[Any]) -> list[tuple[Any, Any]]:
+    """Components side by side; the printed 0 stands for as many zeros as are wanted."""
+    if is_zero(right):
+        b = b * len(a)
+    if is_zero(left):
+        a = a * len(b)
+    return list(zip(a, b, strict=True))
 
 
 def _spread(state: dict[Name, Any]) -> Fraction:

@@ -99,8 +99,9 @@ class Section:
         return definition.expression
 
     def is_unknown(self, name: Name) -> bool:
-        """Whether a symbol is a degree of freedom of some crossing: x_1, u_0, v_3, and families like them."""
-        return (name.base, name.bold) in self.families and bool(_INDEX.match(name.sub))
+        """Whether a symbol is a degree of freedom: x_1, u_0, v_3 and families like them, or one that forces are printed for."""
+        family = (name.base, name.bold) in self.families and bool(_INDEX.match(name.sub))
+        return family or name in self.unknowns
 
     def _enter(self, name: Name, inside: tuple[Name, ...], at: Expr) -> tuple[Name, ...]:
         """The definitions being followed, with one more; a circle, also through shifted indices, is an error."""
@@ -124,9 +125,7 @@ class Section:
 
         def visit(node: Expr, inside: tuple[Name, ...] = ()) -> None:
             for part in node.walk():
-                if part.op == "derivative" and not self.is_unknown(part.name):
-                    found.setdefault(part.name)
-                if part.op == "force" and not self.is_unknown(part.name):
+                if part.op in {"derivative", "force"} and not self.is_unknown(part.name):
                     found.setdefault(part.name)
                 if part.op != "symbol" or part.name in seen:
                     continue
@@ -331,11 +330,14 @@ def _read_document(source: Source, declare: Callable[[Section], Energy | None]) 
 
 def _definitions(section: Section, own: Iterable[Relation]) -> list[Relation]:
     """Take definitions, assumptions and the energy out of a section's relations; what is left are claims."""
-    left = []
+    left: list[Relation] = []
+    second_energies: list[Relation] = []
     for relation in own:
         section.assumptions += assumptions(relation.members, relation.operators)
         for equal in _equalities(relation):
             first, second = equal.members[:2]
+            if first.op == "energy" and section.energy is not None and not equal.inline:
+                second_energies.append(equal)
             if first.op == "energy" and section.energy is None and section.title != "":
                 section.energy = Definition(first.name, second, equal)
             elif (
@@ -353,7 +355,25 @@ def _definitions(section: Section, own: Iterable[Relation]) -> list[Relation]:
             if len(equal.operators) > 1:
                 rest = replace(equal, members=equal.members[1:], operators=equal.operators[1:], offset=second.span[0])
                 left.append(rest)
+    for relation in second_energies:
+        _check_second_energy(section, relation)
     return left
+
+
+def _check_second_energy(section: Section, relation: Relation) -> None:
+    """A section has one energy; another formula for it must be one of the same unknowns."""
+    assert section.energy is not None
+    name, first = relation.members[0].name, section.energy
+    unknowns = [
+        {n for n in section.base_symbols(tree) if section.is_unknown(n)}
+        for tree in (first.expression, relation.members[1])
+    ]
+    if name != first.symbol or unknowns[0] != unknowns[1]:
+        message = (
+            f"equation ({relation.equation}) states a second energy in section '{section.title}', after equation "
+            f"({first.relation.equation}); is a heading missing?"
+        )
+        raise ShapeError(relation.members[0], message)
 
 
 def _equalities(relation: Relation) -> Iterator[Relation]:
@@ -376,17 +396,28 @@ def _unknowns(section: Section, own: Iterable[Relation]) -> None:
     section.families |= {(name.base, name.bold) for name in named if _INDEX.match(name.sub)}
     base = section.base_symbols(section.energy.expression)
     if section.declared is not None:
-        section.parameters = tuple(parameter.name for parameter in section.declared.parameters)
+        section.parameters = _declared_parameters(section, section.declared, base, own)
         section.unknowns = section.declared.unknowns
         section.families |= {(name.base, name.bold) for name in section.unknowns}
         if not section.assumptions:
             section.assumptions = list(section.declared.domain)
         return
     section.families |= {(n.base, n.bold) for n in base if n.bold and _INDEX.match(n.sub)}
-    section.parameters = tuple(name for name in base if not section.is_unknown(name))
-    section.unknowns = tuple(
-        sorted((n for n in base if section.is_unknown(n)), key=lambda n: (not n.bold, n.base, n.sub))
-    )
+    unknown = [n for n in base if n in named or section.is_unknown(n)]
+    section.parameters = tuple(name for name in base if name not in unknown)
+    section.unknowns = tuple(sorted(unknown, key=lambda n: (not n.bold, n.base, n.sub)))
+
+
+def _declared_parameters(
+    section: Section, declared: Energy, base: list[Name], own: Iterable[Relation]
+) -> tuple[Name, ...]:
+    """Declared parameters, and symbols of the printed energy that the section uses in their place throughout."""
+    names = tuple(parameter.name for parameter in declared.parameters)
+    uses = [n.name for r in own for m in r.members for n in m.walk() if n.op == "symbol"]
+    strange = [n for n in base if n not in names and n not in declared.unknowns and not section.is_unknown(n)]
+    unused = [n for n in names if n not in base]
+    renamed = sum(map(uses.count, strange)) > sum(map(uses.count, unused)) + len(strange)
+    return (*names, *strange) if renamed else names
 
 
 def _claims(relation: Relation) -> list[Claim]:
@@ -408,6 +439,9 @@ def _check_shapes(document: Document, groups: list[tuple[Section, list[Relation]
                     error.span[0],
                     f"equation ({relation.equation}): {error.message}" if not relation.inline else error.message,
                 )
+            if any(op != "=" for op in relation.operators) and any(map(_states_mechanics, relation.members)):
+                what = "" if relation.inline else f"equation ({relation.equation}): "
+                document.source.fail(relation.offset, what + "a claim about forces or energies must be an equation")
             for index, operator in enumerate(relation.operators):
                 for member, kind in zip(relation.members[index : index + 2], kinds[index : index + 2], strict=True):
                     if operator != "=" and kind not in (Type.SCALAR, Type.UNKNOWN):

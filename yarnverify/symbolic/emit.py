@@ -207,7 +207,11 @@ def _checks(energy: Energy, section: Section, reading: Components) -> Iterable[t
     for node in dict.fromkeys(n for n in tree.walk() if n.op == "norm"):
         if section.type_of(node.args[0]).value == "vector":
             ends = [n.name.label for n in node.args[0].walk() if n.op == "symbol"]
-            yield reading.value(node), "energy", f"the segment {'-'.join(sorted(ends))} has length zero"
+            yield (
+                reading.value(node),
+                "energy",
+                f"the segment {'-'.join(sorted(ends))} has length zero, or so little that its square vanishes",
+            )
     if energy.elsewhere != "zero":
         for assumption in energy.domain:
             margin = reading.value(assumption.left) - reading.value(assumption.right)

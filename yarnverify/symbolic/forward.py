@@ -4,7 +4,8 @@ Independent of the first reading: no SymPy, no normal forms, no formula for any 
 its gradient and Hessian by all unknowns at one state; the energy's own definition is evaluated in jets. Over rationals the
 state is chosen so that lengths and sines come out rational (square roots that do not are adjoined exactly); an angle is
 replaced by a rational number drawn for its cosine, and pi by another, since an identity of functions holds whatever their
-values (an arc cosine satisfies no algebraic equation). Two sides that differ there differ as functions up to bad luck,
+values (an arc cosine of what varies is no algebraic function; relations between several, such as arccos(2 c^2 - 1) =
+2 arccos(c), are not seen). Two sides that differ there differ as functions up to bad luck,
 which the balls, with true angles and pi, then exclude.
 """
 
@@ -76,7 +77,7 @@ class Evaluation:
             rows, second = self.columns(inner.name), self._energy_jet.second
             block = [[self._zero if second is None else second[i, j] * FORCE for j in wrt] for i in rows]
         else:
-            jets = self._value(inner, jets=True)
+            jets = self._energy_jet if inner.op == "energy" else self._value(inner, jets=True)
             rows_of = [jets] if not isinstance(jets, np.ndarray) else list(jets.reshape(-1))
             firsts = [Jet._lift(jet).first for jet in rows_of]
             block = [[self._zero if first is None else first[j] for j in wrt] for first in firsts]

@@ -72,9 +72,9 @@ class Law:
                 return value
             if sp.expand(value + known) == 0:
                 return -value
-        if value.is_Symbol or value.is_number:
-            return value if value.is_Symbol and scalar_name(value) in self.section.parameters else sp.Abs(value)
-        return sp.Abs(value)
+        declared = self.section.declared
+        positive = [parameter.name for parameter in declared.parameters if parameter.positive] if declared else []
+        return value if value.is_Symbol and scalar_name(value) in positive else sp.Abs(value)
 
     def vector(self, expr: Expr) -> tuple[Any, Segment]:
         """A vector as (scale, segment)."""

@@ -33,6 +33,8 @@ from yarnverify.symbolic.reading import Reading, UnsupportedError, Value
 from yarnverify.symbolic.tree import Name
 
 Poly = Any  # a SymPy PolyElement
+_LARGEST_PRODUCT = 60_000  # terms times terms; the paper's formulas stay below a tenth of it
+_ROOTS_COMPARED = 5  # how many known roots a new one is compared with, in all combinations
 _SPARE = 12  # generators kept free for square roots and angles that are met on the way
 
 
@@ -78,6 +80,7 @@ class Quotient:
         other = self._lift(other)
         if not self.numerator or not other.numerator:
             return self.field.constant(0)
+        self.field.check_size(self.numerator, other.numerator)
         factors = dict(self.factors)
         for factor, power in other.factors:
             factors[factor] = factors.get(factor, 0) + power
@@ -206,8 +209,15 @@ class Field(Reading):
                 kept.append((factor, power))
         return Quotient(self, numerator, tuple(kept))
 
+    @staticmethod
+    def check_size(a: Poly, b: Poly) -> None:
+        """Refuse products that would take minutes."""
+        if len(a) * len(b) > _LARGEST_PRODUCT:
+            raise UnsupportedError(f"the normal form grows beyond {_LARGEST_PRODUCT} products of terms")
+
     def times_power(self, poly: Poly, factor: Poly, power: int) -> Poly:
         for _ in range(power):
+            self.check_size(poly, factor)
             poly = self.reduce(poly * factor)
         return poly
 
@@ -311,7 +321,7 @@ class Field(Reading):
 
         Keeps the roots independent, so that for instance sin(t) = 2 sin(t/2) cos(t/2) is seen.
         """
-        known = [square for square in self._roots if square != inside]
+        known = [square for square in self._roots if square != inside][:_ROOTS_COMPARED]
         for count in range(1, len(known) + 1) if inside not in self._roots else ():
             for chosen in combinations(known, count):
                 product = self.reduce(prod(chosen, start=inside))

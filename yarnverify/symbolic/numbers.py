@@ -14,6 +14,7 @@ from typing import Any
 import flint
 import numpy as np
 
+_MOST_ROOTS = 4
 Number = Any  # flint.fmpq, Algebraic, flint.arb or float
 
 
@@ -142,6 +143,8 @@ class Rationals:
             raise UndefinedError("square root of a negative number")
         if value in self._roots:
             return Algebraic(self._roots, {1 << self._roots.index(value): flint.fmpq(1)})
+        if len(self._roots) == _MOST_ROOTS:  # a number has 2^roots parts
+            raise UndefinedError(f"more than {_MOST_ROOTS} independent square roots at one state")
         for count in range(1, len(self._roots) + 1):  # keeps the roots independent
             for chosen in combinations(range(len(self._roots)), count):
                 product, mask = value, 0

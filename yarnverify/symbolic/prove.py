@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from yarnverify.source import Source
-from yarnverify.symbolic.court import Court, Finding, Verdict, flat, undefined_symbols
+from yarnverify.symbolic.court import Court, Finding, Verdict, undefined_symbols
 from yarnverify.symbolic.declare import Declarations, Energy, Quantity
 from yarnverify.symbolic.document import Claim, Definition, Document, Section, block_of, instantiate, read_document
-from yarnverify.symbolic.reading import UnsupportedError
 from yarnverify.symbolic.tree import ZERO, Expr, Name
 
 
@@ -34,13 +33,14 @@ class Judged:
 
 @dataclass(frozen=True)
 class Completeness:
-    """Which non-zero forces and Jacobian blocks a section lists, and which it lacks."""
+    """Which non-zero forces and Jacobian blocks a section lists, which it lacks, and which could not be examined."""
 
     section: Section
     court: Court
     listed: tuple[str, ...]
     zero: tuple[str, ...]
     missing: tuple[Expr, ...]
+    unknown: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -226,18 +226,18 @@ def _completeness(section: Section, court: Court) -> Completeness:
     missing: list[Expr] = []
     zero: list[str] = []
     found: list[str] = []
+    unknown: list[str] = []
     forces = [Expr("force", value=name) for name in section.unknowns]
     jacobians = [Expr("derivative", (force,), name) for force in forces for name in section.unknowns]
     for block in (*forces, *jacobians):
-        try:
-            nothing = all(q.is_zero for q in flat(court.block(block)))
-        except (UnsupportedError, ZeroDivisionError):
-            continue
+        nothing = court.is_zero(block)
         name = block_of(block)
-        if nothing:
+        if nothing is None:
+            unknown.append(name)
+        elif nothing:
             zero.append(name)
         elif name in listed:
             found.append(name)
         else:
             missing.append(block)
-    return Completeness(section, court, tuple(found), tuple(zero), tuple(missing))
+    return Completeness(section, court, tuple(found), tuple(zero), tuple(missing), tuple(unknown))

@@ -30,7 +30,7 @@ _DEEPEST, _LONGEST_NUMBER, _LONGEST_EXPONENT = 60, 100, 2  # far beyond any form
 _TRAILING = re.compile(r"(?:[\s.,;~]|\\quad|\\qquad|\\[,;:! ])*\Z")
 _RELATION = re.compile(r"[=<>]|\\(?:le|leq|ge|geq|lt|gt)(?![A-Za-z])")
 _PIECE = re.compile(
-    r"(?P<escaped>\\\$)"
+    r"(?P<escaped>\\\$|<!--[\s\S]*?-->|^```(?!math\b)[\s\S]*?^```)"  # no formula: escaped, comment, code
     r"|(?P<display>\$\$)"
     r"|(?P<inline>\$)"
     r"|^(?P<marks>\#{1,6})[ \t]+(?P<title>[^\n]*?)[ \t\#]*$"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -138,7 +138,9 @@ def _derived(judged: Judged) -> str | None:
     """What should stand there when no small change mends it: the declared or derived formula."""
     claim, section = judged.claim, judged.section
     if judged.kind == "definition":
-        return f"{latex(claim.relation.members[0])} = {latex(claim.left)}"
+        index, value = judged.index
+        declared = instantiate(claim.left, value, index) if index else claim.left
+        return f"{latex(claim.relation.members[0])} = {latex(declared)}"
     if judged.kind == "energy":
         return f"{latex(claim.left)} = {latex(judged.court.energy)}"
     block = claim.left.args[0] if claim.left.op == "neg" else claim.left
@@ -161,8 +163,8 @@ def _derived_block(section: Section, energy: Expr, block: Expr) -> Expr | None:
 # -- witnesses --------------------------------------------------------------------------------------------------------
 
 
-def _digits(value: Any) -> str:
-    return str(value.str(17, radius=False))
+def _texts(values: Iterable[Any], digits: int) -> list[str]:
+    return [str(value.str(digits, radius=False)) for value in values]
 
 
 def _witness(judged: Judged) -> dict[str, Any] | None:
@@ -179,12 +181,15 @@ def _witness(judged: Judged) -> dict[str, Any] | None:
         floats[label] = hexes if name.bold else hexes[0]
     if not witness.right:
         return {"point": point, "hex": floats, "printed": ["undefined"], "true": [], "residual": []}
+    digits = 17
+    while digits < 10**4 and _texts(witness.right, digits) == _texts(witness.left, digits):
+        digits *= 2  # a difference too small to be seen yet
     return {
         "point": point,
         "hex": floats,
-        "printed": [_digits(value) for value in witness.right],
-        "true": [_digits(value) for value in witness.left],
-        "residual": [_digits(r - t) for r, t in zip(witness.right, witness.left, strict=True)],
+        "printed": _texts(witness.right, digits),
+        "true": _texts(witness.left, digits),
+        "residual": _texts([r - t for r, t in zip(witness.right, witness.left, strict=True)], 17),
     }
 
 
@@ -272,9 +277,10 @@ def _list(values: list[float]) -> str:
 def _completeness(found: Completeness) -> dict[str, Any]:
     return {
         "section": found.section.title,
-        "verdict": "refuted" if found.missing else "proved",
+        "verdict": "refuted" if found.missing else "undecided" if found.unknown else "proved",
         "listed": list(found.listed),
         "zero": list(found.zero),
+        "unknown": list(found.unknown),
         "missing": [
             {"block": block_of(expr), "latex": latex(expr), "derived": _missing(found, expr)} for expr in found.missing
         ],

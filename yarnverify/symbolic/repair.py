@@ -13,6 +13,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import combinations
 from typing import Any
 
 from yarnverify.symbolic.court import Court, Verdict
@@ -20,7 +21,7 @@ from yarnverify.symbolic.document import Section, block_of
 from yarnverify.symbolic.forward import Evaluation
 from yarnverify.symbolic.latex import latex, name_latex
 from yarnverify.symbolic.numbers import Floats, UndefinedError
-from yarnverify.symbolic.tree import ONE, PI, Expr, Name, ShapeError, Type, number, rebuild
+from yarnverify.symbolic.tree import ONE, PI, ZERO, Expr, Name, ShapeError, Type, number, rebuild
 
 Sides = list[tuple[Expr, Expr]]
 _FLOAT_TOLERANCE = 1e-6  # sorts out candidates; whatever passes is proved exactly, or dropped
@@ -87,7 +88,17 @@ class Workshop:
         states = [dict(evaluation.state) for evaluation in self.court.exact[:2]]
         return [Evaluation(self.section, state, Floats(), self.court.energy) for state in states]
 
+    def _says_the_same(self, candidate: Candidate) -> bool:
+        """Whether the chain still speaks of the blocks that it spoke of, and says something of them."""
+        blocks = [{block_of(member) for member in members} - {""} for members in (self.members, candidate.members)]
+        renamed = candidate.change in ("index", "undefined symbol")  # the name of a block may itself be the mistake
+        if len(blocks[0]) != len(blocks[1]) or (blocks[0] != blocks[1] and not renamed):
+            return False
+        return all(left != right for left, right in self.sides(candidate.members))
+
     def _hopeful(self, candidate: Candidate) -> bool:
+        if not self._says_the_same(candidate):
+            return False
         try:
             for left, right in self.sides(candidate.members):
                 kinds = {self.section.type_of(left), self.section.type_of(right)}
@@ -120,6 +131,8 @@ class Workshop:
             for cost, change, before, after, tree in self._changes(member):
                 members = (*self.members[:index], tree, *self.members[index + 1 :])
                 yield Candidate(cost + aside, change, before, after, members)
+            if index:
+                yield Candidate(4, "zero", member, ZERO, (*self.members[:index], ZERO, *self.members[index + 1 :]))
 
     def _renamings(self) -> Iterator[Candidate]:
         """A symbol that nothing defines, read as one that the section knows, wherever the chain has it."""
@@ -183,6 +196,9 @@ class Workshop:
             for index in range(len(node.args)):
                 rest = (*node.args[:index], *node.args[index + 1 :])
                 yield 4, "extra term", node, rest[0] if len(rest) == 1 else replace(node, args=rest)
+            for term in self._terms:
+                if term not in node.args and self._type(term) is kind:
+                    yield 5, "missing term", node, replace(node, args=(*node.args, term))
         yield from self._factors(node, kind)
 
     def _symbol_changes(self, node: Expr) -> Iterator[tuple[int, str, Expr, Expr]]:
@@ -216,6 +232,22 @@ class Workshop:
             yield 4, "missing factor", node, before
             if kind is Type.MATRIX:
                 yield 4, "missing factor", node, _after(node, matrix)
+
+    @cached_property
+    def _terms(self) -> list[Expr]:
+        """Terms that the section's other formulas have, also for another neighbour, with either sign."""
+        found: dict[Expr, None] = {}
+        for claim in self.section.claims:
+            for node in claim.right.walk():
+                for term in node.args if node.op == "add" else ():
+                    plain = term.args[0] if term.op == "neg" else term
+                    for tree in (
+                        plain,
+                        *(_swapped(plain, i, j) for i, j in combinations(self._indices, 2) if i != "0"),
+                    ):
+                        found.setdefault(tree)
+                        found.setdefault(_negated(tree))
+        return list(found)
 
     def _type(self, node: Expr) -> Type | None:
         try:
@@ -262,6 +294,18 @@ def _renamed(old: Name, new: Name, node: Expr) -> Expr | None:
     return None
 
 
+def _swapped(tree: Expr, i: str, j: str) -> Expr:
+    """A tree with two indices exchanged."""
+    other = {i: j, j: i}
+
+    def change(node: Expr) -> Expr | None:
+        if node.op == "symbol" and node.name.sub in other:
+            return replace(node, value=node.name.with_sub(other[node.name.sub]))
+        return None
+
+    return rebuild(tree, change)
+
+
 def _is_number(node: Expr) -> bool:
     return all(part.op in {"number", "frac"} for part in node.walk())
 
@@ -286,6 +330,8 @@ def describe(repair: Repair) -> str:
         return f"sign of {latex(body)}"
     if repair.change == "undefined symbol":
         return f"{name_latex(repair.before.name)} should be {after}"
+    if repair.change == "missing term":
+        return f"missing term {latex(repair.after.args[-1])}"
     return f"{repair.change}: {before} should be {after}"
 
 

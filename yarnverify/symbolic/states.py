@@ -82,7 +82,7 @@ class StateMaker:
         for name in self.names:
             if name.bold:
                 continue
-            low = 1 if name in self.positive or not self.section.is_unknown(name) else -20
+            low = 1 if name in self.positive else -20
             width = 20 + attempt // 50  # widened when the assumptions are hard to meet
             state[name] = Fraction(draw.randrange(low, low + width + 20) or 1, 4)
         scalars = [state[n] for n in self.names if not n.bold]
