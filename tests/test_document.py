@@ -150,12 +150,8 @@ def test_assumptions_of_a_chain(chain: str, expected: list[str]) -> None:
                 r"dF_u1/dx1: -\frac{\partial F_{u_1}}{\partial \mathbf{x}_1} = 0",
             ],
         ),
-        ("V = k", ["V: V = k"]),  # a second energy of the section is a claim on the first
         (r"\theta = F_{u_1}", [r"theta: \theta = F_{u_1}"]),  # forces are never part of a definition
         ("u_1 = 2 u_0", ["u_1: u_1 = 2 u_0"]),  # an unknown is not defined either
-        ("0 < F_{u_1} = k u_1", ["F_u1: F_{u_1} = k u_1"]),
-        ("F_{u_1} = k u_1 > 0", ["F_u1: F_{u_1} = k u_1"]),
-        ("F_{u_1} = k u_1 > F_{u_0} = 0", ["F_u1: F_{u_1} = k u_1", "F_u0: F_{u_0} = 0"]),
     ],
 )
 def test_claims_of_a_display(formula: str, expected: list[str]) -> None:
@@ -411,3 +407,29 @@ def test_an_energy_is_a_scalar() -> None:
 
 def test_an_undefined_symbol_is_left_for_the_verdict() -> None:
     assert len(section(r"$$F_{u_1} = q \mathbf{x}_1 + r \quad (2)$$").claims) == 1
+
+
+BAD_STATEMENTS = [
+    ("0 < F_{u_1} = k u_1", "a claim about forces or energies must be an equation"),
+    ("F_{u_1} = k u_1 > F_{u_0} = 0", "a claim about forces or energies must be an equation"),
+    (r"\frac{\partial F_{u_1}}{\partial u_1} > 0", "a claim about forces or energies must be an equation"),
+    ("V = k", "states a second energy in section 'A', after equation (1); is a heading missing?"),
+    (r"V_b = \frac{1}{2} k u_1^2", "states a second energy in section 'A', after equation (1); is a heading missing?"),
+]
+
+
+@pytest.mark.parametrize(("statement", "message"), BAD_STATEMENTS)
+def test_a_statement_that_cannot_be_judged_is_refused(statement: str, message: str) -> None:
+    with pytest.raises(InputError, match=rf"^d\.md:5:\d+: .*{re.escape(message)}"):
+        document("## A", ENERGY, rf"$${statement} \quad (2)$$")
+
+
+def test_an_energy_may_be_stated_in_another_form() -> None:
+    (section,) = document("## A", ENERGY, r"$$V = k \frac{u_1^2}{2} \quad (2)$$").sections
+    assert [claim.block for claim in section.claims] == ["V"]
+
+
+def test_points_without_an_index_are_unknowns_where_forces_name_them() -> None:
+    energy = r"$$V = \frac{1}{2} k \|\mathbf{q} - \mathbf{p}\|^2 \quad (1)$$"
+    (section,) = document("## A", energy, r"$$\mathbf{F}_{\mathbf{p}} = -\mathbf{F}_{\mathbf{q}} \quad (2)$$").sections
+    assert [str(name) for name in section.unknowns] == ["p", "q"] and [str(n) for n in section.parameters] == ["k"]

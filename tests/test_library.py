@@ -91,7 +91,7 @@ def test_a_document_that_nothing_declares_is_judged_by_itself(tmp_path: Path, na
 
 def test_none_chosen_is_none_even_at_home(tmp_path: Path) -> None:
     own = folder_of(tmp_path, d=text(0, 4))
-    assert shelf_for(own / "d.md", text(0, 4), "none") == Shelf(None, "d.md", "by itself alone")
+    assert shelf_for(own / "d.md", text(0, 4), "none") == Shelf(None, "d.md", "by itself alone", own)
 
 
 def test_a_chosen_folder_is_taken_by_name(tmp_path: Path) -> None:
@@ -187,7 +187,7 @@ def claim(equation: str, verdict: str, change: str | None = None) -> dict[str, A
 
 def settled(claims: list[dict[str, Any]], *accepted: Erratum, missing: tuple[str, ...] = ()) -> dict[str, Any]:
     part = {"missing": [{"block": block} for block in missing]}
-    found: dict[str, Any] = {"claims": deepcopy(claims), "completeness": [part]}
+    found: dict[str, Any] = {"claims": deepcopy(claims), "completeness": [part], "equations": ["1", "2", "3", "4"]}
     settle(found, Shelf(None, "d.md", ""), accepted)
     return found
 

@@ -234,11 +234,12 @@ class Court:
         if not compared.seen and compared.lacks_value is not None:
             at, why = compared.lacks_value
             return Finding(Verdict.REFUTED, f"what is printed has no value: {why}", Witness(at, (), ()))
+        if unsupported and state is None:
+            states = f"the {compared.seen} exact states tried" if compared.seen else "no state, since none was found"
+            return Finding(Verdict.UNDECIDED, f"{unsupported}; equal at {states}")
         if not compared.seen:
             what = "both sides have a value at no state tried" if self.exact else "no state satisfies the assumptions"
             return Finding(Verdict.UNDECIDED, what)
-        if unsupported and state is None:
-            return Finding(Verdict.UNDECIDED, f"{unsupported}; equal at the {compared.seen} exact states tried")
         if equal:
             return Finding(Verdict.INCONSISTENT, "equal as normal forms, different at an exact state")
         if equal is None and not unsupported:

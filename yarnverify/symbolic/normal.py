@@ -26,7 +26,7 @@ from typing import Any
 
 from sympy import QQ, Symbol
 from sympy.polys.orderings import lex
-from sympy.polys.rings import ring
+from sympy.polys.rings import PolyRing, ring
 
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.reading import Reading, UnsupportedError, Value
@@ -34,6 +34,7 @@ from yarnverify.symbolic.tree import Name
 
 Poly = Any  # a SymPy PolyElement
 _LARGEST_PRODUCT = 60_000  # terms times terms; the paper's formulas stay below a tenth of it
+_LARGEST_FACTORED, _MOST_FACTORED = 200, 10  # terms and generators of what is still factored
 _ROOTS_COMPARED = 5  # how many known roots a new one is compared with, in all combinations
 _SPARE = 12  # generators kept free for square roots and angles that are met on the way
 
@@ -227,9 +228,27 @@ class Field(Reading):
             monomial, content = poly.LM, poly.LC
             return content, tuple((self.ring.gens[i], e) for i, e in enumerate(monomial) if e)
         if poly not in self._factored:
-            content, parts = poly.factor_list()
-            self._factored[poly] = content, tuple(parts)
+            self._factored[poly] = self._find_factors(poly)
         return self._factored[poly]
+
+    def _find_factors(self, poly: Poly) -> tuple[Any, tuple[tuple[Poly, int], ...]]:
+        """Factors over the generators that occur; a polynomial too large for that stays whole, which is as right."""
+        used = [i for i in range(self.ring.ngens) if any(monomial[i] for monomial in poly)]
+        if len(poly) > _LARGEST_FACTORED or len(used) > _MOST_FACTORED:
+            return poly.LC, ((poly.monic(), 1),)
+        small = PolyRing([self.ring.symbols[i] for i in used], QQ, lex)
+        content, parts = small.from_dict({tuple(m[i] for i in used): c for m, c in poly.items()}).factor_list()
+
+        def back(part: Poly) -> Poly:
+            spread = {}
+            for monomial, coefficient in part.items():
+                exponents = [0] * self.ring.ngens
+                for i, exponent in zip(used, monomial, strict=True):
+                    exponents[i] = exponent
+                spread[tuple(exponents)] = coefficient
+            return self.ring.from_dict(spread)
+
+        return content, tuple((back(part), power) for part, power in parts)
 
     # -- roots, absolute values, angles ---------------------------------------------------------------------------
 
@@ -324,6 +343,8 @@ class Field(Reading):
         known = [square for square in self._roots if square != inside][:_ROOTS_COMPARED]
         for count in range(1, len(known) + 1) if inside not in self._roots else ():
             for chosen in combinations(known, count):
+                if prod(len(square) for square in (inside, *chosen)) > 10 * _LARGEST_FACTORED:
+                    continue  # too large to be recognised as a square
                 product = self.reduce(prod(chosen, start=inside))
                 content, parts = self.factor(product)
                 outside, rest = _rational_root(content)

@@ -94,7 +94,7 @@ class Workshop:
         renamed = candidate.change in ("index", "undefined symbol")  # the name of a block may itself be the mistake
         if len(blocks[0]) != len(blocks[1]) or (blocks[0] != blocks[1] and not renamed):
             return False
-        return all(left != right for left, right in self.sides(candidate.members))
+        return self.fixed > 0 or all(left != right for left, right in self.sides(candidate.members))
 
     def _hopeful(self, candidate: Candidate) -> bool:
         if not self._says_the_same(candidate):

@@ -633,8 +633,8 @@ KERNEL = runtime.Kernel(
         ("k_b", True),
     ),
     checks=(
-        ("energy", "the segment x0-x1 has length zero"),
-        ("energy", "the segment x0-x2 has length zero"),
+        ("energy", "the segment x0-x1 has length zero, or so little that its square vanishes"),
+        ("energy", "the segment x0-x2 has length zero, or so little that its square vanishes"),
         ("energy", "u1 > u2 does not hold"),
         ("derivatives", "theta is 0 or pi within rounding, where this variant divides by its sine"),
     ),

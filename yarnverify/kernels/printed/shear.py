@@ -615,8 +615,8 @@ KERNEL = runtime.Kernel(
         ("L", True),
     ),
     checks=(
-        ("energy", "the segment x0-x1 has length zero"),
-        ("energy", "the segment x0-x3 has length zero"),
+        ("energy", "the segment x0-x1 has length zero, or so little that its square vanishes"),
+        ("energy", "the segment x0-x3 has length zero, or so little that its square vanishes"),
         ("derivatives", "phi is 0 or pi within rounding, where this variant divides by its sine"),
     ),
     energy=_energy,

@@ -324,7 +324,7 @@ KERNEL = runtime.Kernel(
         ("k_s", True),
     ),
     checks=(
-        ("energy", "the segment x0-x1 has length zero"),
+        ("energy", "the segment x0-x1 has length zero, or so little that its square vanishes"),
         ("energy", "u1 > u0 does not hold"),
     ),
     energy=_energy,
