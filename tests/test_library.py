@@ -187,7 +187,10 @@ def claim(equation: str, verdict: str, change: str | None = None) -> dict[str, A
 
 def settled(claims: list[dict[str, Any]], *accepted: Erratum, missing: tuple[str, ...] = ()) -> dict[str, Any]:
     part = {"missing": [{"block": block} for block in missing]}
-    found: dict[str, Any] = {"claims": deepcopy(claims), "completeness": [part], "equations": ["1", "2", "3", "4"]}
+    numbers = ["1", "2", "3", "4"]
+    found: dict[str, Any] = {
+        "document": "d.md", "claims": deepcopy(claims), "completeness": [part], "equations": numbers
+    }  # fmt: skip
     settle(found, Shelf(None, "d.md", ""), accepted)
     return found
 
@@ -220,6 +223,13 @@ def test_errata_are_settled(
     found = settled(claims, *accepted)
     assert found["errata"] == dict(zip(("accepted", "new", "stale"), expected, strict=True))
     assert found["as_expected"] is not any(expected[1:])
+
+
+@pytest.mark.parametrize(("name", "stale"), [("d.md", ["2", "9"]), ("excerpt.md", ["2"])])
+def test_an_erratum_of_an_equation_that_is_not_printed_is_stale_but_in_an_excerpt(name: str, stale: list[str]) -> None:
+    found: dict[str, Any] = {"document": name, "claims": [deepcopy(GOOD)], "completeness": [], "equations": ["1", "2"]}
+    settle(found, Shelf(None, "d.md", ""), (KNOWN, Erratum("9", "sign of a", "slip")))
+    assert found["errata"]["stale"] == stale
 
 
 def test_an_accepted_claim_carries_its_reason() -> None:

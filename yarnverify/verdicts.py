@@ -90,6 +90,7 @@ def settle(record: dict[str, Any], shelf: Shelf, accepted: tuple[Erratum, ...]) 
         elif claim["equation"] not in new:
             new.append(claim["equation"])
     missing = [item["block"] for part in record["completeness"] for item in part["missing"]]
-    stale = [e.equation for e in accepted if e not in used and e.equation in record["equations"]]
+    whole = record["document"] == shelf.document  # an excerpt says nothing about equations that it leaves out
+    stale = [e.equation for e in accepted if e not in used and (whole or e.equation in record["equations"])]
     record["errata"] = {"accepted": [e.equation for e in accepted if e in used], "new": new, "stale": stale}
     record["as_expected"] = not (new or stale or missing)

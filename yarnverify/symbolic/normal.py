@@ -24,9 +24,10 @@ from itertools import combinations
 from math import prod
 from typing import Any
 
+import flint
 from sympy import QQ, Symbol
 from sympy.polys.orderings import lex
-from sympy.polys.rings import PolyRing, ring
+from sympy.polys.rings import ring
 
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.reading import Reading, UnsupportedError, Value
@@ -34,7 +35,6 @@ from yarnverify.symbolic.tree import Name
 
 Poly = Any  # a SymPy PolyElement
 _LARGEST_PRODUCT = 60_000  # terms times terms; the paper's formulas stay below a tenth of it
-_LARGEST_FACTORED, _MOST_FACTORED = 200, 10  # terms and generators of what is still factored
 _ROOTS_COMPARED = 5  # how many known roots a new one is compared with, in all combinations
 _SPARE = 12  # generators kept free for square roots and angles that are met on the way
 
@@ -232,23 +232,22 @@ class Field(Reading):
         return self._factored[poly]
 
     def _find_factors(self, poly: Poly) -> tuple[Any, tuple[tuple[Poly, int], ...]]:
-        """Factors over the generators that occur; a polynomial too large for that stays whole, which is as right."""
+        """Factors over the generators that occur, by FLINT, since SymPy's own factoring may run for hours here."""
         used = [i for i in range(self.ring.ngens) if any(monomial[i] for monomial in poly)]
-        if len(poly) > _LARGEST_FACTORED or len(used) > _MOST_FACTORED:
-            return poly.LC, ((poly.monic(), 1),)
-        small = PolyRing([self.ring.symbols[i] for i in used], QQ, lex)
-        content, parts = small.from_dict({tuple(m[i] for i in used): c for m, c in poly.items()}).factor_list()
+        context = flint.fmpq_mpoly_ctx.get(tuple(f"g{i}" for i in used), "lex")
+        dense = {tuple(m[i] for i in used): flint.fmpq(int(c.numerator), int(c.denominator)) for m, c in poly.items()}
+        content, parts = context.from_dict(dense).factor()
+        back = [
+            (self.ring.from_dict({self._spread(m, used): _rational(c) for m, c in p.to_dict().items()}), int(e))
+            for p, e in parts
+        ]
+        return _rational(content), tuple(sorted(back, key=lambda part: str(part[0])))
 
-        def back(part: Poly) -> Poly:
-            spread = {}
-            for monomial, coefficient in part.items():
-                exponents = [0] * self.ring.ngens
-                for i, exponent in zip(used, monomial, strict=True):
-                    exponents[i] = exponent
-                spread[tuple(exponents)] = coefficient
-            return self.ring.from_dict(spread)
-
-        return content, tuple((back(part), power) for part, power in parts)
+    def _spread(self, monomial: tuple[int, ...], used: list[int]) -> tuple[int, ...]:
+        exponents = [0] * self.ring.ngens
+        for i, exponent in zip(used, monomial, strict=True):
+            exponents[i] = int(exponent)
+        return tuple(exponents)
 
     # -- roots, absolute values, angles ---------------------------------------------------------------------------
 
@@ -343,8 +342,6 @@ class Field(Reading):
         known = [square for square in self._roots if square != inside][:_ROOTS_COMPARED]
         for count in range(1, len(known) + 1) if inside not in self._roots else ():
             for chosen in combinations(known, count):
-                if prod(len(square) for square in (inside, *chosen)) > 10 * _LARGEST_FACTORED:
-                    continue  # too large to be recognised as a square
                 product = self.reduce(prod(chosen, start=inside))
                 content, parts = self.factor(product)
                 outside, rest = _rational_root(content)
@@ -499,6 +496,10 @@ class Field(Reading):
         if not unknown.bold:
             return self.derivative(value, unknown)
         return [self.derivative(value, unknown, axis) for axis in range(3)]
+
+
+def _rational(value: flint.fmpq) -> Any:
+    return QQ(int(value.p), int(value.q))
 
 
 def _rational_root(value: Any) -> tuple[Any, Any]:
