@@ -396,7 +396,7 @@ def test_a_curve_holds_a_line_for_each_variant_and_the_condition(folder: Path) -
     error, amplification = curve["variants"]["differentiated"]["E"], curve["condition"]["E"]
     # at angles around 1e-6 the arc cosine loses twice the digits that the inputs do
     assert max(error[at] / amplification[at] for at in range(15, 25)) > 1e3
-    assert amplification[20] > 1e5 and error[-1] == "inf"
+    assert amplification[20] > 1e5 and float(error[-1]) > 1e16
 
 
 def test_numbers_are_short_and_exact() -> None:

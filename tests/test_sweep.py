@@ -175,6 +175,12 @@ def test_the_place_of_a_run_depends_on_its_plan(units: list[Unit], monkeypatch: 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     monkeypatch.setitem(PROFILES, "quick", TINY)
+    monkeypatch.setattr(sweep, "curves", lambda energy: ("rest",) if energy.name == "parallel_contact" else ())
+    monkeypatch.setattr(
+        command,
+        "plan",
+        lambda profile, energies, variants: plan(profile, energies or ["stretch", "parallel_contact"], variants),
+    )
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     # targets are judged on the real profile, by `yarnverify accuracy --check`; here the commands are
     monkeypatch.setattr(command, "missed_targets", lambda record: [])
