@@ -459,3 +459,34 @@ def test_every_kernel_of_the_package_is_found() -> None:
         assert kernel("printed", name).DOFS == getattr(kernels, name).DOFS
     with pytest.raises(InputError, match="no such kernel"):
         kernel("imagined", "bending")
+
+
+@pytest.mark.parametrize("name", ENERGIES)
+def test_a_perfect_kernel_meets_every_target_in_every_regime(
+    name: str, folder: Path, declarations: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The targets ask for nothing that rounding the true result once does not give."""
+    made = declared(declarations, name)
+
+    def results(q: Array, **given: Any) -> Truth:
+        return truth(made, Points(q.astype(float), {key: given[str(key)] for key in names}))
+
+    names = [str(parameter.name) for parameter in made.parameters]
+
+    def evaluate(q: Array, *, errors: str, **given: Any) -> Any:
+        found = results(q, **given)
+        return found.energy, found.gradient, found.hessian
+
+    perfect = types.SimpleNamespace(
+        evaluate=evaluate,
+        energy=lambda q, errors, **given: results(q, **given).energy,
+        gradient=lambda q, errors, **given: results(q, **given).gradient,
+        hessian=lambda q, errors, **given: results(q, **given).hessian,
+    )
+    monkeypatch.setattr(cells_module, "kernel", lambda variant, energy: perfect)
+    for regime in regimes(made):
+        asked = unit(folder, energy=name, regime=regime.name, variants=("accurate", "fast", "reference"), count=12)
+        found = run_unit(asked)["cells"]
+        assert not missed_targets({"cells": found}), regime.name
+        for cell in found:
+            assert all(part["worst"] is None or part["worst"] <= 1 for part in cell["outputs"].values()), regime.name

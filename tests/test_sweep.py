@@ -163,6 +163,28 @@ def test_what_another_plan_left_is_not_taken(units: list[Unit], tmp_path: Path) 
     assert len(again) == 2
 
 
+def test_an_interruption_is_one_line(small: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    real, done = command.run, []
+
+    def stops(units: Any, pool: Any, folder: Any, advance: Any) -> Any:
+        def advances(label: str, total: int) -> None:
+            done.append(label)
+            if len(done) == 3:
+                raise KeyboardInterrupt
+
+        return real(units, pool, folder, advances)
+
+    monkeypatch.setattr(command, "run", stops)
+    asked = ["parallel_contact", "--executor", "serial"]
+    assert call(asked, monkeypatch) == 3
+    assert "interrupted; 3 of" in capsys.readouterr().err
+    monkeypatch.setattr(command, "run", real)
+    assert call([*asked, "--json", "-"], monkeypatch) == 0
+    after = json.loads(capsys.readouterr().out)
+    assert call([*asked, "--json", "-"], monkeypatch) == 0
+    assert json.loads(capsys.readouterr().out) == after
+
+
 def test_the_place_of_a_run_depends_on_its_plan(units: list[Unit], monkeypatch: Any, tmp_path: Path) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert state_folder(units) == state_folder(list(units)) != state_folder(units[:-1])
