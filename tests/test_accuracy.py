@@ -158,6 +158,13 @@ def test_an_energy_that_does_not_act_has_no_condition(declarations: Any) -> None
     made = declared(declarations, "parallel_contact")
     points = Points(np.array([[0.0], [2.0]]), {key: np.ones(1) for key in ("k_c", "L", "d")})
     assert not hessian_condition(made, points, truth(made, points), 0).any()
+    assert condition("E", made, points, truth(made, points)).tolist() == [[0.0]]
+
+
+def test_an_energy_of_zero_at_rest_has_no_relative_accuracy_to_lose(declarations: Any) -> None:
+    made = declared(declarations, "stretch")
+    points = Points(np.array([[0.0, 0, 0, 2, 3, 6, 0, 7]]).T, {"k_s": np.ones(1)})
+    assert condition("E", made, points, truth(made, points)).tolist() == [[np.inf]]
 
 
 @pytest.mark.parametrize(
