@@ -11,6 +11,7 @@ from typing import Any
 from yarnverify.library import MAIN_DOCUMENT, derivations
 
 DEFAULT_VARIANT = "accurate"
+WRITTEN_BY_HAND = {"__init__.py", "compiled.py", "doubledouble.py", "geometry.py", "runtime.py", "tape.py"}
 
 
 @dataclass
@@ -84,8 +85,7 @@ def generate_kernels(check: bool, advance: Callable[[str, int], None] = lambda l
 
     folder = Path(__file__).parent / "kernels"
     texts, record = kernel_modules(derivations(), MAIN_DOCUMENT, DEFAULT_VARIANT, advance)
-    kept = {"__init__.py", "compiled.py", "doubledouble.py", "geometry.py", "runtime.py", "tape.py"}
     there = {path.relative_to(folder).as_posix() for path in folder.rglob("*.py")}
-    outcome = settle_files(folder, texts, check, sorted(there - set(texts) - kept), "yarnverify generate")
+    outcome = settle_files(folder, texts, check, sorted(there - set(texts) - WRITTEN_BY_HAND), "yarnverify generate")
     outcome.record = record
     return outcome

@@ -13,7 +13,7 @@ from yarnverify.library import MAIN_DOCUMENT, derivations
 from yarnverify.show import mistake_lines, tally_lines
 from yarnverify.verdicts import verdicts
 
-_OTHERS = ("accuracy",)  # records that commands of their own write
+MEASURED = ("accuracy",)  # records that commands of their own write
 
 
 def build_report(out: Path, check: bool, advance: Callable[[str, int], None] = lambda label, total: None) -> Outcome:
@@ -42,14 +42,26 @@ def build_report(out: Path, check: bool, advance: Callable[[str, int], None] = l
         f"records/{name}.json": json.dumps(record, indent=1, ensure_ascii=False) + "\n"
         for name, record in records.items()
     }
-    texts |= pages({name: json.loads(texts[f"records/{name}.json"]) for name in records})
+    texts |= pages({name: json.loads(texts[f"records/{name}.json"]) for name in records} | _measured(out))
     there = {path.relative_to(out).as_posix() for pattern in ("*.md", "records/*.json") for path in out.glob(pattern)}
-    there -= {f"records/{name}.json" for name in _OTHERS}
+    there -= {f"records/{name}.json" for name in MEASURED}
     outcome = settle_files(out, texts, check, sorted(there - set(texts)), "yarnverify report")
     outcome.lines = [*lines, *outcome.lines]
     outcome.differs |= not expected
     outcome.record = {"tally": records["verdicts"]["tally"], "as_expected": expected, "files": sorted(texts)}
     return outcome
+
+
+def _measured(out: Path) -> dict[str, Any]:
+    """Records that are there from commands of their own; None for one that was not run."""
+    found: dict[str, Any] = {}
+    for name in MEASURED:
+        path = out / "records" / f"{name}.json"
+        try:
+            found[name] = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+        except ValueError as error:
+            raise InputError(f"{path}: {error}; yarnverify {name} --write makes it anew") from None
+    return found
 
 
 def _records(advance: Callable[[str, int], None]) -> tuple[dict[str, Any], list[str], bool]:

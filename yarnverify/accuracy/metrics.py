@@ -3,12 +3,12 @@
     error = |computed - true| / (u max(|true|, smallest normal number))
 
 normwise (2-norm) over a block, three rows of a gradient that belong to a point or one that belongs to a sliding coordinate,
-and likewise for the Hessian; or for each component alone, where one below u times its block is held to u times its block: further
-down a sum in twice the digits has none left. Since a number below the smallest normal one is held to within half
+and likewise for the Hessian; or for each component alone, where one below u times its block is held to u times its block:
+further down a sum in twice the digits has none left. Since a number below the smallest normal one is held to within half
 the smallest subnormal, which is u times the smallest normal, one unit is always one unit of what the format can hold, and
 a true zero asks for a zero. A result that is not finite where the truth fits the format is an infinite error. Where the truth
-does not fit, the block has no error, nor has any block of an element that was refused for that: NaN here, counted as overflow or
-as without a value.
+does not fit, the block has no error, nor has any block of an element that was refused for that: NaN here, counted as overflow
+or as without a value.
 
 Differences are taken to the true value, not to the nearest double: an error of a hundredth of a unit is seen.
 """

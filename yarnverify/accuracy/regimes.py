@@ -314,7 +314,7 @@ def _deviations(shape: Shape, limits: Limits, draw: Draw, n: int) -> dict[str, A
     frames = np.repeat(np.eye(3)[:, :, None], n, axis=2)
     lengths = np.ldexp(1.0, draw.integers(-1, 2, (len(shape.edges), n)))
     values = placed(shape, draw, n, half=np.zeros(n), lengths=lengths, base=0.0, frames=frames)
-    # where the cosine is 1, where theta's square is 0, and far below; not the last numbers before 0, of which few digits are left
+    # where the cosine is 1, where theta's square is 0, and far below; not the last numbers before 0, which have few digits left
     # to measure (tests/test_hard_cases.py has them)
     some = np.array([1e-4, 1e-8, 1e-30] if limits is LIMITS["float32"] else [1e-8, 1e-12, 1e-200])
     by = some[draw.integers(0, len(some), n)] * signs(draw, n)

@@ -72,7 +72,7 @@ class Truth:
     energy_low, gradient_low, hessian_low
         What the true value exceeds the double by, itself rounded.
     energy_moves, gradient_moves
-        Derivatives by all inputs times the inputs, rows of ``q`` and then parameters: (m, n) and (dof, m, n), in double precision.
+        Derivatives by all inputs times the inputs, rows of ``q`` and then parameters: (m, n) and (dof, m, n).
     has_energy, has_derivatives
         (n,) bool; an exact fold has an energy and no gradient.
     flushed

@@ -1,7 +1,7 @@
 """Pairs ``high + low`` over arrays, for the variant ``reference``: twice the digits, rounded once at the end.
 
-The parts are extended doubles where the processor has them (64 bits each, so about 2^-126), since 2^-104 of plain doubles is not
-quite enough where 16 digits cancel; elsewhere plain doubles. Error-free transformations by Knuth and Dekker, on whole arrays.
+The parts are extended doubles where the processor has them (64 bits each, so about 2^-126), since 2^-104 of plain doubles is
+not quite enough where 16 digits cancel; elsewhere plain doubles. Error-free transformations by Knuth and Dekker, on arrays.
 Kernels run on these numbers unchanged, but for the series of ``turning``, which is summed as far as pairs see it.
 """
 

@@ -7,6 +7,8 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from yarnverify.report.accuracy import accuracy_table
+
 _TEMPLATES = Environment(
     loader=FileSystemLoader(Path(__file__).parent / "templates"),
     undefined=StrictUndefined,
@@ -42,8 +44,17 @@ def pages(records: dict[str, Any]) -> dict[str, str]:
             mistakes=_mistakes(found, section),
             completeness=next((part for part in found["completeness"] if part["section"] == section), None),
             kernels=records["kernels"].get(name, {}),
+            accuracy=_accuracy(records.get("accuracy"), name),
         )
     return dict(sorted(texts.items()))
+
+
+def _accuracy(record: dict[str, Any] | None, energy: str) -> list[str]:
+    """The tables of an energy; empty where the sweep was not run."""
+    if record is None:
+        return []
+    kinds = sorted({cell["dtype"] for cell in record["cells"] if cell["energy"] == energy}, reverse=True)
+    return [accuracy_table(record, energy, kind) for kind in kinds]
 
 
 def _render(template: str, **values: Any) -> str:
