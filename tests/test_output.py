@@ -19,7 +19,7 @@ from yarnverify.symbolic.declare import Declarations, Point, Positive, Sliding, 
 from yarnverify.symbolic.derive import declared_section
 from yarnverify.symbolic.emit import plain_program, statements
 from yarnverify.symbolic.explain import explain, explain_energy, explanation
-from yarnverify.symbolic.modules import VARIANTS, derived_programs, kernel_modules, printed_program
+from yarnverify.symbolic.modules import VARIANTS, derived_programs, kernel_modules, printed_program, proved
 from yarnverify.symbolic.plain import plain
 from yarnverify.symbolic.prove import read_with
 from yarnverify.symbolic.reader import read_formula
@@ -112,7 +112,7 @@ def test_an_energy_without_measures_is_differentiated_plainly() -> None:
     made = plain_program(volume, declared_section(volume))
     assert len(made.gradient) == 11 and len(made.hessian) == 66
     for variant in ("accurate", "differentiated"):
-        programs, notes = derived_programs(volume, Declarations((volume,)), variant)
+        programs, notes = derived_programs(volume, proved(volume, Declarations((volume,))), variant)
         assert [statements(p) for p in programs] == [statements(made)] and "no law of known measures" in notes[0]
     record = explain_energy(volume, Declarations((volume,)))
     assert not record["measures"] and "not run for plain differentiation" in explain(record, "text")
@@ -125,7 +125,7 @@ def test_a_block_that_is_not_proved_is_not_emitted(declarations: Any, monkeypatc
     monkeypatch.setattr(Measure, "slope", property(lambda self: tuple((a, -v, f) for a, v, f in right(self))))
     bending = next(e for e in declarations.energies if e.name == "bending")
     with pytest.raises(NotRunError, match="bending: derived block F_x1 is refuted"):
-        derived_programs(bending, declarations, "differentiated")
+        proved(bending, declarations)
 
 
 CANNOT_BE_PRINTED = [

@@ -252,7 +252,7 @@ class _Run:
             or self.engine != "numpy"
         ):
             return False
-        inputs = [float(v) for v in self.rows[:, 0]] + [float(np.reshape(v, -1)[0]) for v in self.values]
+        inputs = [float(v) + 0.0 for v in self.rows[:, 0]] + [float(np.reshape(v, -1)[0]) for v in self.values]
         try:
             found = kernel.tape(0, self.wanted, self.dtype).run_one(inputs)
         except (ArithmeticError, ValueError):
@@ -287,9 +287,12 @@ class _Run:
             for where in ranges:
                 values = [value if np.ndim(value) == 0 else value[where] for value in self.values]
                 targets = self._targets(where)
-                margins, choice = work.first(list(self.rows[:, where]), values, targets)
+                rows = np.add(self.rows[:, where], 0.0, out=work.inputs[:, : where.stop - where.start])  # -0.0 is 0.0
+                margins, choice = work.first(list(rows), values, targets)
                 self._mirror(where)
                 odd = self._strange(margins, targets)
+                if choice.size and not np.isfinite(choice).all():
+                    odd = ~np.isfinite(choice[0]) if odd is None else odd | ~np.isfinite(choice[0])
                 if odd is not None:
                     strange.append(where.start + np.flatnonzero(odd))
                 if choice.size and not choice.min() > 0:
@@ -321,7 +324,7 @@ class _Run:
             self._scatter(at, part)
             return None
         values = [value if np.ndim(value) == 0 else value[at] for value in self.values]
-        margins, _ = work.second(list(self.rows.take(at, axis=1)), values, list(part))
+        margins, _ = work.second(list(self.rows.take(at, axis=1) + 0.0), values, list(part))
         self._scatter(at, part)
         return self._strange(margins, list(part))
 
@@ -367,7 +370,7 @@ class _Run:
     def _special(self, elements: Array) -> None:
         """Evaluate a few elements again, at a scale near 1, or find out why they have no value."""
         kernel = self.kernel
-        rows = self.rows.take(elements, axis=1)
+        rows = self.rows.take(elements, axis=1) + 0.0
         values = [value if np.ndim(value) == 0 else value[elements] for value in self.values]
         reasons = np.full(elements.size, "", dtype=object)
         for label, row in zip(kernel.dofs, rows, strict=True):
@@ -467,6 +470,11 @@ class _Workspace:
         self._run, self._most = run, most
 
     @cached_property
+    def inputs(self) -> Array:
+        """A chunk of the rows of ``q``."""
+        return np.empty((self._run.dof, self._most), self._run.dtype)
+
+    @cached_property
     def first(self) -> _Evaluator:
         return self._run.evaluator(0, self._most)
 
@@ -505,6 +513,8 @@ def _rows(kernel: Kernel, q: ArrayLike) -> Array:
     rows = np.asarray(q)
     if rows.dtype.kind in "iub":
         rows = rows.astype(np.float64)
+    if rows.dtype.kind == "f" and not rows.dtype.isnative:
+        rows = rows.astype(rows.dtype.newbyteorder("="))
     if rows.dtype not in (np.float32, np.float64):
         raise TypeError(f"{kernel.name}: q must be float32, float64 or integer, not {rows.dtype}")
     if rows.ndim != 2 or rows.shape[0] != len(kernel.dofs):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -31,7 +33,7 @@ from yarnverify.symbolic.measures import NoMeasuresError
 from yarnverify.symbolic.prove import read_with
 from yarnverify.symbolic.reading import UnsupportedError
 from yarnverify.symbolic.repair import Workshop
-from yarnverify.symbolic.safe import safe_shapes
+from yarnverify.symbolic.safe import Safe, safe_shapes
 from yarnverify.symbolic.safe_program import safe_program
 from yarnverify.symbolic.tree import FORCE, Expr
 
@@ -62,13 +64,14 @@ def kernel_modules(
     texts: dict[str, str] = {"series.py": series_module()}
     record: dict[str, Any] = {}
     for energy in energies:
+        derived = proved(energy, declarations)
         for variant in VARIANTS:
             advance(f"{energy.name}, {variant}", len(VARIANTS) * len(energies))
             if variant == "printed":
                 made, notes = printed_program(energy, printed)
                 programs = [made]
             else:
-                programs, notes = derived_programs(energy, declarations, variant)
+                programs, notes = derived_programs(energy, derived, variant)
             text, counts = module_text(energy, variant, programs, document, notes)
             texts[f"{variant}/{energy.name}.py"] = text
             record.setdefault(energy.name, {})[variant] = counts
@@ -90,24 +93,51 @@ def series_module() -> str:
     )
 
 
-def derived_programs(energy: Energy, declarations: Declarations, variant: str) -> tuple[list[Program], list[str]]:
-    """The programs of a derived variant, every block of which is proved first, and notes on what is not as wished."""
+@dataclass(frozen=True)
+class Proved:
+    """What an energy's kernels are made of: its derivation, if it is a law of measures, and its safe shapes; all proved."""
+
+    derivation: Derivation | None
+    shapes: tuple[Safe, ...]
+
+
+def proved(energy: Energy, declarations: Declarations) -> Proved:
+    """Derive an energy and prove all of it.
+
+    Raises
+    ------
+    NotRunError
+        If a derived block is not proved.
+    """
     derivation = derive_declared(energy, declarations.quantities)
     if derivation is None:
+        return Proved(None, ())
+    _require_proofs(energy.name, derivation.check())
+    shapes: tuple[Safe, ...] = ()
+    with suppress(NoMeasuresError):
+        shapes = tuple(safe_shapes(derivation))
+    for shape in shapes:
+        _require_proofs(f"{energy.name}, {shape.shape} shape", shape.check())
+    return Proved(derivation, shapes)
+
+
+def derived_programs(energy: Energy, found: Proved, variant: str) -> tuple[list[Program], list[str]]:
+    """The programs of a derived variant, and notes on what is not as wished."""
+    if found.derivation is None:
         return [plain_program(energy, declared_section(energy))], [
             "this energy is no law of known measures: plain differentiation, nothing is done for its singular states"
         ]
-    if variant != "differentiated":
-        try:
-            shapes = safe_shapes(derivation)
-        except NoMeasuresError:
-            note = "there is no safe form for this law; these are the differentiated formulas"
-            return [derived_program(energy, derivation)], [note]
-        for shape in shapes:
-            _require_proofs(f"{energy.name}, {shape.shape} shape", shape.check())
-        exact = variant == "accurate"
-        return [safe_program(energy, shape, exact, len(shapes) == 1) for shape in shapes], []
-    return [derived_program(energy, derivation)], []
+    if variant == "differentiated":
+        return [derived_program(energy, found.derivation)], []
+    if not found.shapes:
+        note = "there is no safe form for this law; these are the differentiated formulas"
+        return [derived_program(energy, found.derivation)], [note]
+    exact = variant == "accurate"
+    programs = [safe_program(energy, shape, exact, found.shapes) for shape in found.shapes]
+    if variant == "fast" and found.shapes[-1].shape == "polar":
+        # within rounding of a fold the plain cross product has no direction any more: there, and only there, the exact one
+        programs = [*programs[:1], safe_program(energy, found.shapes[-1], True, found.shapes)]
+    return programs, []
 
 
 def _require_proofs(what: str, found: dict[str, Finding]) -> None:
@@ -117,8 +147,7 @@ def _require_proofs(what: str, found: dict[str, Finding]) -> None:
 
 
 def derived_program(energy: Energy, derivation: Derivation) -> Program:
-    """The program of the derived blocks as they are, each of which is proved first."""
-    _require_proofs(energy.name, derivation.check())
+    """The program of the derived blocks as they are."""
     formulas = {block: tree for first, rest in derivation.blocks(1) for block, tree in (first, *rest)}
     angles = [measure.symbol for measure in derivation.measures if measure.b is not None]
     return program(energy, derivation.section, derivation.law_tree, formulas, 1, angles)

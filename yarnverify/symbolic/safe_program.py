@@ -26,9 +26,10 @@ from yarnverify.symbolic.safe import Corner, Safe
 from yarnverify.symbolic.tree import Name
 
 _SMOOTH_UP_TO = sp.Rational(5, 8)  # cosine between the edges; beyond, the rows of the common point cancel
+_PLAIN_DOWN_TO = sp.Rational(1, 2**16)  # sine; a plain cross product keeps some 37 of 53 bits there
 
 
-def safe_program(energy: Energy, safe: Safe, exact: bool, alone: bool) -> Program:
+def safe_program(energy: Energy, safe: Safe, exact: bool, shapes: tuple[Safe, ...]) -> Program:
     """The program of one shape.
 
     Parameters
@@ -37,9 +38,10 @@ def safe_program(energy: Energy, safe: Safe, exact: bool, alone: bool) -> Progra
         What is computed, and how.
     exact
         Whether rounding errors of edges, products and sums are carried along.
-    alone
-        Whether this is the only shape, so that there is no choice.
+    shapes
+        All that the energy has.
     """
+    alone = len(shapes) == 1
     formulas = {block: tree for first, rest in safe.blocks(1) for block, tree in (first, *rest)}
     reading = Components(safe.section, formulas, forces=False, given=safe.given)
     value, gradient, hessian = entries_of(energy, reading, safe.law, 1)
@@ -55,6 +57,8 @@ def safe_program(energy: Energy, safe: Safe, exact: bool, alone: bool) -> Progra
         ends = "0 or pi" if alone else "0" if safe.corner.sign > 0 else "pi"
         text = f"{safe.corner.symbol} is {ends}, where the energy has no derivative"
         checks.append((_symbol(safe.corner.name("size")), "derivatives", text))
+        if alone and not exact:
+            choice = _symbol(safe.corner.name("s")) - _PLAIN_DOWN_TO
     lengths = {_symbol(m.a.l.name): _low(m.a) for m in safe.lengths}
     totals = _totals(energy, lengths)
     if choice is not None:
