@@ -64,7 +64,7 @@ def truth(energy: Any, q: Array, parameters: dict[str, Array]) -> tuple[Array, A
                 point[name] = tuple(part) if name.bold else part[0]
                 at += len(part)
             ordered = {n: point[n] for n in (*energy.unknowns, *names.values())}
-            jet = Evaluation(declared_section(energy), ordered, Balls(), energy.expression)._energy_jet
+            jet = Evaluation(declared_section(energy), ordered, Balls(), energy.expression).energy_jet
             values.append((float(jet.value), np.vectorize(float)(jet.first), np.vectorize(float)(jet.second)))
     return tuple(np.array([v[i] for v in values]).transpose(*range(1, i + 1), 0) for i in range(3))  # type: ignore[return-value]
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.jets import Jet
-from yarnverify.symbolic.numbers import Algebraic, Floats, Number, UndefinedError
+from yarnverify.symbolic.numbers import Algebraic, Balls, Floats, Number, UndefinedError
 from yarnverify.symbolic.tree import FORCE, ZERO, Expr, Name
 
 State = Mapping[Name, Any]  # a Fraction for a scalar, three for a point
@@ -57,7 +57,8 @@ class Evaluation:
     # true blocks
 
     @cached_property
-    def _energy_jet(self) -> Jet:
+    def energy_jet(self) -> Jet:
+        """The energy with its gradient and Hessian by all unknowns, in the order of the state."""
         return Jet._lift(self._value(self.energy, jets=True))
 
     def columns(self, unknown: Name) -> list[int]:
@@ -66,18 +67,18 @@ class Evaluation:
     def block(self, expr: Expr) -> Any:
         """True value of a force, an energy or a derivative."""
         if expr.op == "energy":
-            return self._energy_jet.value
+            return self.energy_jet.value
         if expr.op == "force":
             columns = self.columns(expr.name)
-            first = self._energy_jet.first
+            first = self.energy_jet.first
             found = np.array([self._zero if first is None else first[i] * FORCE for i in columns], dtype=object)
             return found.reshape(3, 1) if expr.name.bold else found[0]
         inner, wrt = expr.args[0], self.columns(expr.name)
         if inner.op == "force":
-            rows, second = self.columns(inner.name), self._energy_jet.second
+            rows, second = self.columns(inner.name), self.energy_jet.second
             block = [[self._zero if second is None else second[i, j] * FORCE for j in wrt] for i in rows]
         else:
-            jets = self._energy_jet if inner.op == "energy" else self._value(inner, jets=True)
+            jets = self.energy_jet if inner.op == "energy" else self._value(inner, jets=True)
             rows_of = [jets] if not isinstance(jets, np.ndarray) else list(jets.reshape(-1))
             firsts = [Jet._lift(jet).first for jet in rows_of]
             block = [[self._zero if first is None else first[j] for j in wrt] for first in firsts]
@@ -112,15 +113,14 @@ class Evaluation:
 
     def _base(self, name: Name, jets: bool) -> Any:
         given = self.state[name]
-        parts = [self.numbers.constant(Fraction(part)) for part in (given if name.bold else (given,))]
+        parts = [self.numbers.constant(part) for part in (given if name.bold else (given,))]
         columns = self.columns(name)
         if jets and columns:
             count = len(self._unknowns)
             dtype = float if isinstance(self.numbers, Floats) else object
             zero, one = self._zero, self.numbers.constant(Fraction(1))
             firsts = [np.array([one if i == column else zero for i in range(count)], dtype=dtype) for column in columns]
-            flat = np.full((count, count), zero, dtype=dtype)
-            parts = [Jet(part, first, flat) for part, first in zip(parts, firsts, strict=True)]
+            parts = [Jet(part, first) for part, first in zip(parts, firsts, strict=True)]
         return np.array(parts, dtype=object).reshape(3, 1) if name.bold else parts[0]
 
     def _value(self, expr: Expr, jets: bool) -> Any:
@@ -142,6 +142,8 @@ class Evaluation:
             return {"sin": lambda: sine, "cos": lambda: cosine, "tan": lambda: sine / _nonzero(cosine)}[
                 str(expr.value)
             ]()
+        if op == "pow" and jets and isinstance(self.numbers, Balls) and (cosine := self._cosine_of(expr)) is not None:
+            return self._power_of_angle(self._value(cosine, jets), int(str(expr.value)))
         values = [self._value(arg, jets) for arg in expr.args]
         first = values[0]
         if op == "add":
@@ -201,6 +203,24 @@ class Evaluation:
         sine = self.numbers.sqrt(1 - cosine * cosine)
         slope = -1 / _nonzero(sine)
         return value.chain(angle, slope, cosine * slope * slope * slope)
+
+    def _cosine_of(self, expr: Expr) -> Expr | None:
+        """The tree under the arc cosine of which this one is an even positive power; None if it is anything else."""
+        assert isinstance(expr.value, int)
+        base = expr.args[0]
+        while base.op == "neg" or (base.op == "symbol" and self.section.meaning(base.name) is not None):
+            base = base.args[0] if base.op == "neg" else self.section.meaning(base.name)  # type: ignore[assignment]
+        even = expr.value > 0 and expr.value % 2 == 0
+        return base.args[0] if even and base.op == "call" and base.value == "arccos" else None
+
+    def _power_of_angle(self, cosine: Any, power: int) -> Any:
+        """An even power of an angle, which unlike the angle is smooth where the angle is 0."""
+        jet = Jet._lift(cosine)
+        square = jet.chain(*self.numbers.squared_arccos(jet.value))
+        result = square
+        for _ in range(power // 2 - 1):
+            result = result * square
+        return result
 
     def _circle(self, expr: Expr, jets: bool) -> tuple[Any, Any]:
         """Sine and cosine; over rationals an angle is recognised as ``n arccos(c)/2 + m pi/2``."""

@@ -9,8 +9,17 @@ import numpy as np
 from yarnverify.symbolic.numbers import Number, UndefinedError
 
 
+def _sum(a: Any, b: Any) -> Any:
+    """Sum of two Hessians, either of which may be absent, being zero."""
+    return b if a is None else a if b is None else a + b
+
+
+def _scaled(a: Any, scale: Number) -> Any:
+    return None if a is None else a * scale
+
+
 class Jet:
-    """A value with its gradient (n,) and Hessian (n, n); ``first is None`` for a constant."""
+    """A value with its gradient (n,) and Hessian (n, n); without ``first`` a constant, without ``second`` linear."""
 
     __slots__ = ("first", "second", "value")
 
@@ -28,12 +37,14 @@ class Jet:
         if self.first is None or other.first is None:
             some = self if other.first is None else other
             return Jet(self.value + other.value, some.first, some.second)
-        return Jet(self.value + other.value, self.first + other.first, self.second + other.second)
+        return Jet(self.value + other.value, self.first + other.first, _sum(self.second, other.second))
 
     __radd__ = __add__
 
     def __neg__(self) -> Jet:
-        return Jet(-self.value) if self.first is None else Jet(-self.value, -self.first, -self.second)
+        if self.first is None:
+            return Jet(-self.value)
+        return Jet(-self.value, -self.first, None if self.second is None else -self.second)
 
     def __sub__(self, other: Any) -> Jet:
         return self + (-other)
@@ -48,9 +59,10 @@ class Jet:
         a, b = self.value, other.value
         if self.first is None or other.first is None:
             scale, some = (a, other) if self.first is None else (b, self)
-            return Jet(a * b) if some.first is None else Jet(a * b, some.first * scale, some.second * scale)
+            return Jet(a * b) if some.first is None else Jet(a * b, some.first * scale, _scaled(some.second, scale))
         mixed = np.outer(self.first, other.first)
-        return Jet(a * b, self.first * b + other.first * a, self.second * b + other.second * a + mixed + mixed.T)
+        bent = _sum(_scaled(self.second, b), _scaled(other.second, a))
+        return Jet(a * b, self.first * b + other.first * a, _sum(bent, mixed + mixed.T))
 
     __rmul__ = __mul__
 
@@ -58,7 +70,8 @@ class Jet:
         """``f(self)`` from f, f', f'' at the value."""
         if self.first is None:
             return Jet(value)
-        return Jet(value, self.first * slope, self.second * slope + np.outer(self.first, self.first) * bend)
+        bent = np.outer(self.first, self.first) * bend
+        return Jet(value, self.first * slope, _sum(_scaled(self.second, slope), bent))
 
     def inverse(self) -> Jet:
         if self.value == 0:
@@ -69,11 +82,9 @@ class Jet:
     def __truediv__(self, other: Any) -> Jet:
         if isinstance(other, Jet):
             return self * other.inverse()
-        return (
-            Jet(self.value / other)
-            if self.first is None
-            else Jet(self.value / other, self.first / other, self.second / other)
-        )
+        if self.first is None:
+            return Jet(self.value / other)
+        return Jet(self.value / other, self.first / other, None if self.second is None else self.second / other)
 
     def __rtruediv__(self, other: Any) -> Jet:
         return self.inverse() * other

@@ -15,7 +15,9 @@ import flint
 import numpy as np
 
 _MOST_ROOTS = 4
+_NEAR = 2.0**-7  # where the series converges fast, and the closed forms begin to cancel
 Number = Any  # flint.fmpq, Algebraic, flint.arb or float
+Given = Fraction | int | float  # what a state holds: all of them exact
 
 
 class UndefinedError(Exception):
@@ -115,7 +117,8 @@ class Rationals:
     def _rational(self) -> Number:
         return flint.fmpq(self._draw.randrange(1, 10**6), self._draw.randrange(1, 10**6))
 
-    def constant(self, value: Fraction) -> Number:
+    def constant(self, value: Given) -> Number:
+        value = Fraction(value)
         return flint.fmpq(value.numerator, value.denominator)
 
     def positive(self, value: Number) -> bool:
@@ -194,8 +197,10 @@ class Balls:
     def __init__(self) -> None:
         self.pi = flint.arb.pi()
 
-    def constant(self, value: Fraction) -> Number:
-        return flint.arb(flint.fmpq(value.numerator, value.denominator))
+    def constant(self, value: Given | flint.arb) -> Number:
+        if isinstance(value, Fraction):
+            return flint.arb(flint.fmpq(value.numerator, value.denominator))
+        return flint.arb(value)
 
     def positive(self, value: Number) -> bool:
         return bool(value > 0)
@@ -215,6 +220,25 @@ class Balls:
     def circle(self, angle: Number) -> tuple[Number, Number]:
         return angle.sin(), angle.cos()
 
+    @staticmethod
+    def squared_arccos(cosine: Number) -> tuple[Number, Number, Number]:
+        """``arccos(c)^2`` with its first two derivatives by c: an analytic function at c = 1, and beyond.
+
+        With s = (1 - c)/2, f = 2F1(1, 1; 3/2; s) = theta/sin(theta) and g = 2F1(2, 2; 5/2; s)/3 it is 4 s (1 - s) f^2,
+        -2 f, 2 g (NIST DLMF 15.4.12 for f). A ball of cosines around 1 is thereby taken for what it is.
+        """
+        sigma = (1 - cosine) / 2
+        if abs(sigma) < _NEAR:
+            f = sigma.hypgeom_2f1(1, 1, flint.arb(3) / 2)
+            g = sigma.hypgeom_2f1(2, 2, flint.arb(5) / 2) / 3
+        else:
+            square = (1 - cosine) * (1 + cosine)
+            if square.contains(0):
+                raise UndefinedError("division by zero")
+            f = cosine.acos() / square.sqrt()
+            g = (1 - cosine * f) / square
+        return 4 * sigma * (1 - sigma) * f * f, -2 * f, 2 * g
+
 
 class Floats:
     """Double precision; only ever used to sort out hopeless candidates quickly."""
@@ -222,7 +246,7 @@ class Floats:
     exact = False
     pi = math.pi
 
-    def constant(self, value: Fraction) -> Number:
+    def constant(self, value: Given) -> Number:
         return float(value)
 
     def positive(self, value: Number) -> bool:
