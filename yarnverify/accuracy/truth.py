@@ -30,6 +30,7 @@ from yarnverify.symbolic.tree import Name
 Array = NDArray[Any]
 BITS = (256, 512, 1024, 2048, 4096, 8192, 16384, 32768)
 _SPARE = 70  # bits of a value that must be known, so that an error of a thousandth of a rounding is seen
+_TIE = 4 * _SPARE  # bits of a value from which on it is taken for one half way between two doubles
 _SMALLEST = 2.0**-1022
 PRECISION = threading.RLock()  # FLINT's working precision is one for all threads
 
@@ -245,7 +246,9 @@ def rounded_ball(ball: Any) -> tuple[float, float, bool] | None:
     """The nearest double, what is left, and whether a value that is not zero became zero; None if the ball is too wide."""
     high = float(ball.lower())
     if high != float(ball.upper()):
-        return None  # also for a ball that is not finite
+        if ball.rel_accuracy_bits() < _TIE:
+            return None  # also for a ball that is not finite
+        high = float(ball.mid())
     if high == 0.0:
         return 0.0, 0.0, not ball.contains(0)
     if abs(high) == np.inf:

@@ -1,0 +1,182 @@
+"""One element against the truth: too large an error, NaN, a warning, a refusal without reason, or none with reason."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from yarnverify.accuracy.conditioning import condition, hessian_condition
+from yarnverify.accuracy.metrics import Errors, measure
+from yarnverify.accuracy.truth import Points, Truth, truth
+from yarnverify.errors import InputError
+from yarnverify.kernels import ElementError
+from yarnverify.strategies import Element
+from yarnverify.symbolic.declare import Energy
+
+Array = NDArray[Any]
+Kind = Literal["error", "not finite", "warning", "refused", "accepted"]
+Output = Literal["E", "G", "H"]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What an error may be: ``rounding + conditioning * condition number``, in units of the rounding."""
+
+    rounding: float
+    conditioning: float = 0.0
+    componentwise: bool = False
+
+
+# Variants that promise nothing are held to what plain arithmetic on safe formulas can reach.
+_PLAIN = Limit(16.0, 8.0)
+LIMITS = {"accurate": Limit(16.0), "fast": _PLAIN, "reference": Limit(1.0, componentwise=True)}
+
+
+@dataclass(frozen=True)
+class Flaw:
+    """Something that is wrong at one element.
+
+    Attributes
+    ----------
+    kind
+        ``error`` above its limit; ``not finite``, a NaN or infinity where the truth is finite; ``warning``; ``refused``, an
+        ``ElementError`` where there is a value; ``accepted``, none where there is no value.
+    where
+        Output and block, such as ``H x1,u1``.
+    text
+        One line to be read.
+    size
+        How far off, to steer a search: the error as a multiple of its limit.
+    """
+
+    kind: Kind
+    where: str
+    text: str
+    size: float = np.inf
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What is wrong, and the largest error as a multiple of ``Limit.rounding``."""
+
+    flaws: tuple[Flaw, ...]
+    worst: float
+
+
+def limit_of(variant: str) -> Limit:
+    return LIMITS.get(variant, _PLAIN)
+
+
+@cache
+def declared(name: str) -> Energy:
+    """The declared energy of a kernel.
+
+    Raises
+    ------
+    InputError
+        For a name that nothing declares.
+    """
+    from yarnverify.library import derivations
+    from yarnverify.symbolic.declare import load_declarations
+
+    energies = {energy.name: energy for energy in load_declarations(derivations()).energies}
+    if name not in energies:
+        raise InputError(f"there is no energy {name!r}; one of {', '.join(sorted(energies))}")
+    return energies[name]
+
+
+def points_of(elements: Iterable[Element]) -> Points:
+    """Elements as the points at which they are evaluated: parameters as the kernel rounds them to the type of ``q``."""
+    given = list(elements)
+    dtype = given[0].q.dtype
+    names = given[0].parameters
+    parameters = {name: np.array([one.parameters[name] for one in given]).astype(dtype) for name in names}
+    q = np.concatenate([one.q for one in given], axis=1).astype(np.float64)
+    return Points(q, {name: value.astype(np.float64) for name, value in parameters.items()})
+
+
+def judge(module: Any, energy: Energy, element: Element) -> Judgement:
+    """Compare a kernel with the truth at one element.
+
+    Parameters
+    ----------
+    module
+        A kernel, with ``VARIANT``, ``energy`` and ``evaluate``.
+    energy
+        Its declaration.
+    element
+        float64 or float32.
+    """
+    points = points_of([element])
+    true = truth(energy, points)
+    fits = [_fits(array, element.q.dtype) for array in (true.energy, true.gradient, true.hessian)]
+    flaws: list[Flaw] = []
+    worst = 0.0
+    calls: list[tuple[Any, str, bool]] = [
+        (module.energy, "E", bool(true.has_energy[0]) and fits[0]),
+        (module.evaluate, "EGH", bool(true.has_derivatives[0]) and all(fits)),
+    ]
+    for function, outputs, has_value in calls:
+        found, flaw = _call(function, element, has_value)
+        if flaw is not None:
+            flaws.append(flaw)
+        if found is None or not has_value:
+            continue
+        for output, computed in zip(outputs, found, strict=True):
+            wrong, size = _compare(module.VARIANT, energy, points, true, output, computed)
+            flaws += wrong
+            worst = max(worst, size)
+    return Judgement(tuple(dict.fromkeys(flaws)), worst)
+
+
+def _fits(array: Array, dtype: Any) -> bool:
+    with np.errstate(over="ignore"):
+        return bool(np.isfinite(array.astype(dtype)).all())
+
+
+def _call(function: Any, element: Element, has_value: bool) -> tuple[list[Array] | None, Flaw | None]:
+    q, parameters = element
+    name = function.__name__
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            found = function(q, **parameters)
+    except ElementError as error:
+        return None, Flaw("refused", name, f"{name} is refused where it has a value: {error}") if has_value else None
+    except Warning as warning:
+        return None, Flaw("warning", name, f"{name} warns: {warning}")
+    if not has_value:
+        return None, Flaw("accepted", name, f"{name} gives numbers where there is no value in this format")
+    return list(found) if isinstance(found, tuple) else [found], None
+
+
+def _compare(
+    variant: str, energy: Energy, points: Points, true: Truth, output: str, computed: Array
+) -> tuple[list[Flaw], float]:
+    """Flaws of one output, and its largest error as a multiple of the limit without conditioning."""
+    limit = limit_of(variant)
+    errors: Errors = measure(output, computed, true, energy.unknowns, str(computed.dtype))
+    sizes = (errors.componentwise if limit.componentwise else errors.normwise)[:, 0]
+    worst = float(np.nanmax(sizes, initial=0.0)) / limit.rounding
+    if worst <= 1:
+        return [], worst
+    conditions = np.zeros(len(sizes))
+    if limit.conditioning:
+        known = output != "H"
+        conditions = condition(output, energy, points, true)[:, 0] if known else hessian_condition(energy, points, true, 0)
+    flaws = []
+    for block, size, number in zip(errors.blocks, sizes, conditions, strict=True):
+        allowed = limit.rounding + limit.conditioning * (number if np.isfinite(number) else np.inf)
+        where = f"{output} {block}".strip()
+        if size == np.inf:
+            flaws.append(Flaw("not finite", where, f"{where} is not finite where the truth is"))
+        elif size > allowed:
+            text = f"{where} is wrong by {size:.3g} u, allowed are {allowed:.3g} u"
+            flaws.append(Flaw("error", where, text, float(size / allowed)))
+    return flaws, worst
