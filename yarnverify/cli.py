@@ -1,4 +1,4 @@
-"""The command line: ``yarnverify prove | derive | generate | report``.
+"""The command line: ``yarnverify prove | derive | generate | accuracy | report``.
 
 Exit status: 0 all as expected; 1 a check failed, or an erratum is new or stale; 2 bad usage or input; 3 asked for but
 could not run. Heavy imports happen inside the commands, so that ``--help`` answers at once.
@@ -152,6 +152,50 @@ def generate(
 
     with progress("generating") as advance:
         outcome = generate_kernels(check, advance)
+    _finish(outcome, json_file)
+
+
+@app.command
+def accuracy(
+    energy: str | None = None,
+    /,
+    *,
+    variant: Annotated[tuple[str, ...], Parameter(help="Variant to measure; all by default.", negative="")] = (),
+    profile: Annotated[Literal["quick", "full"], Parameter(help="How many states are tried.")] = "quick",
+    executor: Annotated[str, Parameter(help="Where it runs: processes, serial, or dask:ADDRESS.")] = "processes",
+    jobs: Annotated[int | None, Parameter(help="How many processes; as many as there are cores by default.")] = None,
+    state: Annotated[
+        Path | None, Parameter(help="Folder for what is done, until all is; in the cache by default.")
+    ] = None,
+    out: Annotated[Path, Parameter(help="Folder of reports that holds the record.")] = Path("reports"),
+    write: Annotated[bool, Parameter(negative="", help="Write the record.")] = False,
+    check: Annotated[bool, Parameter(negative="", help="Compare with the record instead of showing tables.")] = False,
+    replay: Annotated[
+        str | None, Parameter(help="One state again, as the record writes it; nothing else is done.")
+    ] = None,
+    json_file: Json = None,
+) -> None:
+    """The error of every kernel where it is hard to get right, against the true result.
+
+    Parameters
+    ----------
+    energy
+        Name of a declared energy, such as bending; all by default.
+    """
+    if replay is not None:
+        from yarnverify.accuracy.replay import replay as replay_state
+        from yarnverify.accuracy.replay import replay_lines
+        from yarnverify.library import derivations
+
+        found = replay_state(replay, derivations())
+        if not _json(found, json_file):
+            print("\n".join(replay_lines(found)))
+        return
+    from yarnverify.accuracy.command import accuracy as measured
+
+    with progress("measuring") as advance:
+        names = () if energy is None else (energy,)
+        outcome = measured(names, variant, profile, executor, jobs, state, out, write, check, advance)
     _finish(outcome, json_file)
 
 

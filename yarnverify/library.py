@@ -156,7 +156,8 @@ def fingerprint(parts: Iterable[bytes | Path]) -> str:
     return digest.hexdigest()
 
 
-def _cache() -> Path:
+def cache_folder() -> Path:
+    """Where results are kept between runs."""
     base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     return Path(base) / "yarnverify"
 
@@ -164,7 +165,7 @@ def _cache() -> Path:
 def recall(key: str) -> dict[str, Any] | None:
     """A record stored under a fingerprint, or None."""
     try:
-        record = json.loads((_cache() / f"{key}.json").read_text(encoding="utf-8"))
+        record = json.loads((cache_folder() / f"{key}.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     return record if isinstance(record, dict) and "claims" in record else None
@@ -172,7 +173,7 @@ def recall(key: str) -> dict[str, Any] | None:
 
 def remember(key: str, record: Any) -> None:
     """Store a result; where the cache cannot be written, the next run works it out again."""
-    path = _cache() / f"{key}.json"
+    path = cache_folder() / f"{key}.json"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         draft = path.with_suffix(f".{os.getpid()}.tmp")

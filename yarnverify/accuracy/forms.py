@@ -126,7 +126,7 @@ def reduce(energy: Energy) -> Reduced:
     ]
     count = len(rows)
     gradient = _sums([[((k,), sign) for k, sign in row] for row in rows], (count,))
-    pairs = [
+    pairs: list[list[tuple[tuple[int, ...], int]]] = [
         [((min(k, n), max(k, n)), sign * other) for (k, sign), (n, other) in product(rows[i], rows[j])]
         for i in range(count)
         for j in range(count)

@@ -133,7 +133,11 @@ class _Raw:
         self.sums = (reduced.gradient, reduced.hessian)
         self.counts = (1, len(reduced.gradient.terms), len(reduced.hessian.terms))
         total = sum(self.counts)
-        self.high, self.low, self.flushed = np.full((total, n), np.nan), np.zeros((total, n)), np.zeros((total, n), bool)
+        self.high, self.low, self.flushed = (
+            np.full((total, n), np.nan),
+            np.zeros((total, n)),
+            np.zeros((total, n), bool),
+        )
         self.has_energy, self.has_derivatives, self.bits = np.zeros(n, bool), np.zeros(n, bool), np.zeros(n, int)
 
     def truth(self, dof: int) -> Truth:
@@ -173,7 +177,7 @@ def _settle_state(reduced: Reduced, values: Sequence[float], at: int, raw: _Raw)
         with flint.ctx.workprec(bits):
             rounded = [rounded_ball(ball) for ball in found]
         if None not in rounded:
-            raw.high[:, at], raw.low[:, at], raw.flushed[:, at] = zip(*rounded, strict=True)  # type: ignore[arg-type]
+            raw.high[:, at], raw.low[:, at], raw.flushed[:, at] = zip(*rounded, strict=True)
             raw.has_energy[at] = raw.has_derivatives[at] = True
             raw.bits[at] = bits
             return
@@ -187,7 +191,7 @@ def _settle_state(reduced: Reduced, values: Sequence[float], at: int, raw: _Raw)
             return
 
 
-def _evaluation(reduced: Reduced, values: Sequence[Any]) -> Evaluation | None | str:
+def _evaluation(reduced: Reduced, values: Sequence[Any]) -> Evaluation | str | None:
     """The definition at a state; "outside" the domain; None where the precision cannot tell which."""
     numbers = Balls()
     balls = iter([numbers.constant(value) for value in values])

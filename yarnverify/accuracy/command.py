@@ -1,0 +1,84 @@
+"""``yarnverify accuracy``: sweep, show, write or compare the record; or replay one state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from yarnverify.accuracy.record import grown, make_record, missed_targets, read_record, record_text
+from yarnverify.accuracy.sweep import PROFILES, executor_named, finish, plan, run, state_folder
+from yarnverify.errors import InputError, NotRunError
+from yarnverify.generation import Outcome
+
+RECORD = Path("records") / "accuracy.json"
+
+
+def sweep(
+    energies: Sequence[str],
+    variants: Sequence[str],
+    profile: str,
+    executor: str,
+    jobs: int | None,
+    state: Path | None,
+    advance: Callable[[str, int], None],
+) -> dict[str, Any]:
+    """The record of a sweep; what an interrupted run of the same sweep has finished is not worked out again."""
+    units, missing = plan(PROFILES[profile], energies, variants)
+    if not units:
+        raise NotRunError(f"no kernels to measure: {'; '.join(missing)}")
+    folder = state or state_folder(units)
+    with executor_named(executor, jobs) as pool:
+        results = run(units, pool, folder, advance)
+    finish(folder)
+    return make_record(PROFILES[profile], units, results, missing)
+
+
+def accuracy(
+    energies: Sequence[str],
+    variants: Sequence[str],
+    profile: str,
+    executor: str,
+    jobs: int | None,
+    state: Path | None,
+    out: Path,
+    write: bool,
+    check: bool,
+    advance: Callable[[str, int], None],
+) -> Outcome:
+    """Sweep, and show, write or compare what was found.
+
+    Raises
+    ------
+    InputError, NotRunError
+        For names that are not there, records that cannot be read, executors that do not answer, files that cannot be written.
+    """
+    from yarnverify.report.accuracy import accuracy_table
+
+    path, part = out / RECORD, bool(energies or variants)
+    if write and (check or part):
+        raise InputError("--write takes the whole sweep: no energy, no --variant, no --check")
+    known = read_record(path) if check else None
+    if known is not None and known["profile"] != profile:
+        raise InputError(f"{path}: was made with --profile {known['profile']}; compare with that one")
+    record = sweep(energies, variants, profile, executor, jobs, state, advance)
+    outcome = Outcome(record)
+    names = list(dict.fromkeys(cell["energy"] for cell in record["cells"]))
+    for name in () if check else names:
+        outcome.lines += [f"{name}", "", accuracy_table(record, name)]
+    problems = missed_targets(record)
+    if known is not None:
+        problems += grown(known, record, whole=not part)
+    if write:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(record_text(record), encoding="utf-8")
+        except OSError as error:
+            raise NotRunError(f"{path}: cannot write: {(error.strerror or str(error)).lower()}") from None
+        outcome.lines.append(f"{path}: written")
+    outcome.lines += [*record["not_run"], *problems]
+    outcome.differs = bool(problems)
+    cells = f"{len(record['cells'])} cells of {record['points']} states"
+    compared = ", none worse than its record" if check else ""
+    outcome.lines.append(f"{cells}: {len(problems)} problems." if problems else f"{cells}: all as expected{compared}.")
+    return outcome

@@ -1,0 +1,112 @@
+"""One state again: what a kernel gives there, what is true, the error, and what the inputs' rounding explains of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from yarnverify.accuracy.cells import compute, declared_energy, kernel, label, significant
+from yarnverify.accuracy.conditioning import condition, hessian_condition
+from yarnverify.accuracy.forms import rows_of
+from yarnverify.accuracy.metrics import OUTPUTS, UNIT, blocks_of, measure, true_parts
+from yarnverify.accuracy.truth import Points, truth
+from yarnverify.errors import InputError
+
+
+def parse_replay(text: str, folder: Path) -> tuple[Any, str, str, Points]:
+    """Energy, variant, type and state of a text such as a record holds.
+
+    Raises
+    ------
+    InputError
+        Which says what is wrong with it.
+    """
+    words = text.split()
+    if len(words) < 4 or any("=" not in word for word in words[4:]):
+        raise InputError(f"--replay {text!r}: give ENERGY VARIANT TYPE q0,q1,... name=value ...")
+    energy, variant, dtype = declared_energy(words[0], folder), words[1], words[2]
+    if dtype not in UNIT:
+        raise InputError(f"--replay: {dtype}: no such type; there are {', '.join(UNIT)}")
+    try:
+        coordinates = [_number(part) for part in words[3].split(",")]
+        given = {name: _number(value) for name, _, value in (word.partition("=") for word in words[4:])}
+    except ValueError as error:
+        raise InputError(f"--replay: {error}") from None
+    names = [str(parameter.name) for parameter in energy.parameters]
+    dof = len(rows_of(energy)) - len(names)
+    if len(coordinates) != dof:
+        raise InputError(f"--replay: {energy.name} has {dof} coordinates, not {len(coordinates)}")
+    if set(given) != set(names):
+        raise InputError(
+            f"--replay: {energy.name} has the parameters {', '.join(names)}, not {', '.join(given) or 'none'}"
+        )
+    q = np.array(coordinates)[:, None].astype(dtype).astype(float)
+    return energy, variant, dtype, Points(q, {name: np.array([given[name]]) for name in names})
+
+
+def _number(text: str) -> float:
+    return float.fromhex(text) if "x" in text else float(text)
+
+
+def replay(text: str, folder: Path) -> dict[str, Any]:
+    """The state, and for each output its blocks: computed, true, error in units, condition number, and what the loss is."""
+    energy, variant, dtype, points = parse_replay(text, folder)
+    exact = truth(energy, points)
+    computed, _ = compute(kernel(variant, energy.name), points, exact, dtype)
+    rows = []
+    for output in OUTPUTS:
+        errors = measure(output, computed[output], exact, energy.unknowns, dtype)
+        if output == "H":
+            conditions = hessian_condition(energy, points, exact, 0)
+        else:
+            conditions = condition(output, energy, points, exact)[:, 0]
+        high, _ = true_parts(exact, output)
+        for at, (name, place) in enumerate(blocks_of(output, energy.unknowns)):
+            error, amplification = float(errors.normwise[at, 0]), float(conditions[at])
+            rows.append(
+                {
+                    "output": output,
+                    "block": name,
+                    "computed": np.ravel(computed[output][place][..., 0]).astype(float).tolist(),
+                    "true": np.ravel(high[place][..., 0]).tolist(),
+                    "error": significant(error),
+                    "componentwise": significant(float(errors.componentwise[at, 0])),
+                    "condition": significant(amplification),
+                    "label": "no value"
+                    if np.isnan(error)
+                    else label(error, float(np.nan_to_num(amplification, nan=0.0))),
+                }
+            )
+    names = [f"{name.label}.{'xyz'[axis]}" if name.bold else str(name) for name, axis in rows_of(energy)]
+    state = {name: value.hex() for name, value in zip(names, points.rows()[:, 0].tolist(), strict=True)}
+    return {
+        "energy": energy.name,
+        "variant": variant,
+        "dtype": dtype,
+        "state": state,
+        "bits": int(exact.bits[0]),
+        "blocks": rows,
+    }
+
+
+def replay_lines(found: dict[str, Any]) -> list[str]:
+    """What ``replay`` found, for a terminal; of a block its component that is furthest off."""
+    lines = [
+        f"{found['energy']}, {found['variant']}, {found['dtype']}; true to the last digit at {found['bits']} bits",
+        "",
+    ]
+    lines += [f"  {name:<6}{float.fromhex(value):< 25.17g}{value}" for name, value in found["state"].items()]
+    lines += [
+        "",
+        f"  {'block':<10}{'computed':<26}{'true':<26}{'error / u':<12}{'by component':<14}{'condition':<12}loss",
+    ]
+    for row in found["blocks"]:
+        off = [abs(a - b) if a == a and b == b else np.inf for a, b in zip(row["computed"], row["true"], strict=True)]
+        at = off.index(max(off))
+        lines.append(
+            f"  {row['output'] + ' ' + row['block']:<10}{row['computed'][at]:< 26.17g}{row['true'][at]:< 26.17g}"
+            f"{row['error']!s:<12}{row['componentwise']!s:<14}{row['condition']!s:<12}{row['label']}"
+        )
+    return lines
