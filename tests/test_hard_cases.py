@@ -6,71 +6,35 @@ variants whose formulas divide by the sine of an angle are tried where that does
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.variants import ENERGIES, FUNCTIONS, SAFE, bits, kernel, outputs
-from yarnverify.fuzzing.judge import declared, judge
+from tests.cases import (
+    ACROSS,
+    FAR,
+    GENERIC,
+    ORIGIN,
+    Case,
+    X,
+    Y,
+    Z,
+    bent,
+    generic,
+    sheared,
+    stretched,
+    touching,
+    towards,
+    turned,
+)
+from tests.variants import FUNCTIONS, SAFE, kernel, outputs
+from yarnverify.accuracy.truth import truth
+from yarnverify.fuzzing.judge import declared, judge, points_of
 from yarnverify.kernels import ElementError
 from yarnverify.strategies import Element, Turn
 
-PI = np.pi
 ULP = 2.0**-52
-ORIGIN = np.zeros(3)
-X, Y, Z = np.eye(3)
-GENERIC = np.array([3.0, 4.0, 12.0])  # of length 13
-ACROSS = np.array([4.0, -3.0, 0.0])  # of length 5, perpendicular to it
-FAR = np.array([0.5, -1.0, 0.75])
-
-
-def made(*rows: Any, dtype: Any = np.float64, **parameters: float) -> Element:
-    return Element(np.concatenate([np.ravel(row) for row in rows]).astype(dtype)[:, None], parameters)
-
-
-def bent(a: Any, b: Any, at: Any = ORIGIN, u: tuple[float, float] = (1.0, -1.0), **options: Any) -> Element:
-    """A crossing with a bent yarn, from its two edges."""
-    return made(at, at + a, at + b, *u, k_b=2.0, **options)
-
-
-def sheared(a: Any, b: Any, at: Any = ORIGIN, **options: Any) -> Element:
-    """A crossing with a warp and a weft segment, from its two edges."""
-    return made(at, at + a, at + b, k_x=2.0, L=0.5, **options)
-
-
-def stretched(edge: Any, rest: float, at: Any = ORIGIN, **options: Any) -> Element:
-    return made(at, at + edge, 0.0, rest, k_s=3.0, **options)
-
-
-def touching(gap: float, d: float = 0.5) -> Element:
-    return made(0.0, gap, k_c=2.0, L=3.0, d=d)
-
-
-def turned(turn: Turn, length: float = 1.0, first: Any = X, second: Any = Y) -> Any:
-    """An edge that makes an angle with ``first``."""
-    return length * (turn.cosine * first + turn.sine * second)
-
-
-def towards(angle: float, side: str = "0") -> Any:
-    """The second edge of a yarn that turns by an angle, or by pi less that angle."""
-    return turned(Turn("pi" if side == "0" else "0", angle))
-
-
-def generic(turn: Turn) -> Any:
-    """An edge in the generic frame, of length 1."""
-    return turned(turn, 1.0, GENERIC / 13, ACROSS / 5)
-
-
-@dataclass(frozen=True)
-class Case:
-    """An element and whether the variants with plain formulas manage it too."""
-
-    name: str
-    energy: str
-    element: Element
-    plain: bool = False
 
 
 def near(c: float, steps: int) -> Any:
@@ -311,174 +275,6 @@ def test_no_jump_across_a_branch(variant: str, c: float) -> None:
 
 def judge_sizes(module: Any, element: Element) -> Any:
     """Signed relative errors of the energy, and of the norms of gradient and Hessian, in u."""
-    from yarnverify.accuracy.truth import truth
-    from yarnverify.fuzzing.judge import points_of
-
     true = truth(declared("bending"), points_of([element]))
     pairs = zip(outputs(module, element), (true.energy, true.gradient, true.hessian), strict=True)
     return [float((got * (got - want)).sum() / (want * want).sum()) * 2.0**53 for got, want in pairs]
-
-
-# -- bad numbers, shapes and types ------------------------------------------------------------------------------------
-
-REGULAR = {
-    "stretch": stretched(GENERIC, 10.0),
-    "bending": bent(GENERIC, Y - Z),
-    "shear": sheared(GENERIC, Y - Z),
-    "parallel_contact": touching(0.25),
-}
-EACH = pytest.mark.parametrize("energy", ENERGIES)
-
-
-def replaced(element: Element, row: int, value: float) -> Element:
-    q = element.q.copy()
-    q[row] = value
-    return Element(q, element.parameters)
-
-
-@EACH
-@ALL
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_a_coordinate_that_is_not_finite_is_named(energy: str, variant: str, value: float) -> None:
-    module = kernel(energy, variant)
-    for row, label in enumerate(module.DOFS):
-        broken = replaced(REGULAR[energy], row, value)
-        for function in FUNCTIONS:
-            with pytest.raises(ElementError) as caught:
-                outputs(module, broken, function)
-            assert str(caught.value) == f"{energy}: element 0: {label} is {value}"
-            assert all(np.isnan(array).all() for array in outputs(module, broken, function, errors="mask"))
-
-
-@EACH
-@ALL
-def test_bad_parameters_are_named(energy: str, variant: str) -> None:
-    module = kernel(energy, variant)
-    q, parameters = REGULAR[energy]
-    for name in module.PARAMETERS:
-        for value, kind, text in [
-            (-1.0, ValueError, "{} = -1.0 must be finite and not negative"),
-            (np.nan, ValueError, "{} = nan must be finite and not negative"),
-            (np.inf, ValueError, "{} = inf must be finite and not negative"),
-            ([-2.0], ValueError, "{}[0] = -2.0 must be finite and not negative"),
-            ([1.0, 2.0], ValueError, "{} must be a number or have shape (1,), not (2,)"),
-            (1j, TypeError, "{} must be real, not complex128"),
-        ]:
-            with pytest.raises(kind) as caught:
-                module.evaluate(q, **parameters | {name: value})
-            assert str(caught.value) == f"{energy}: {text.format(name)}"
-
-
-@EACH
-@ALL
-@pytest.mark.parametrize("function", FUNCTIONS)
-def test_bad_arrays_are_described(energy: str, variant: str, function: str) -> None:
-    module = kernel(energy, variant)
-    _, parameters = REGULAR[energy]
-    dof = len(module.DOFS)
-    for q, kind, text in [
-        (np.zeros((dof, 1), complex), TypeError, "q must be float32, float64 or integer, not complex128"),
-        (np.zeros((dof, 1), object), TypeError, "q must be float32, float64 or integer, not object"),
-        (np.full((dof, 1), "1"), TypeError, "q must be float32, float64 or integer, not <U1"),
-        (np.zeros(dof), ValueError, f"q must have shape ({dof}, n), not ({dof},)"),
-        (np.zeros((dof + 1, 4)), ValueError, f"q must have shape ({dof}, n), not ({dof + 1}, 4)"),
-        (np.zeros((4, dof)), ValueError, f"q must have shape ({dof}, n), not (4, {dof})"),
-    ]:
-        with pytest.raises(kind) as caught:
-            getattr(module, function)(q, **parameters)
-        assert str(caught.value) == f"{energy}: {text}"
-
-
-@EACH
-@ALL
-def test_an_empty_batch(energy: str, variant: str) -> None:
-    module = kernel(energy, variant)
-    dof = len(module.DOFS)
-    for q in (np.empty((dof, 0)), np.empty((dof, 0), np.float32)):
-        found = module.evaluate(q, **REGULAR[energy].parameters)
-        assert [array.shape for array in found] == [(0,), (dof, 0), (dof, dof, 0)]
-        assert {array.dtype for array in found} == {q.dtype}
-    assert module.packed(np.empty((dof, 0)), **REGULAR[energy].parameters)[2].shape == (dof * (dof + 1) // 2, 0)
-
-
-@EACH
-@ALL
-def test_integers_are_promoted(energy: str, variant: str) -> None:
-    module = kernel(energy, variant)
-    whole = {
-        "stretch": [0, 0, 0, 3, 4, 12, 0, 10],
-        "bending": [0, 0, 0, 3, 4, 12, 0, 1, -1, 1, -1],
-        "shear": [0, 0, 0, 3, 4, 12, 0, 1, -1],
-        "parallel_contact": [0, 0],
-    }[energy]
-    q = np.array(whole)[:, None]
-    parameters = REGULAR[energy].parameters
-    as_float = bits(module.evaluate(q.astype(float), **parameters))
-    for kind in (np.int64, np.int32, np.int8):
-        assert bits(module.evaluate(q.astype(kind), **parameters)) == as_float
-
-
-@pytest.mark.parametrize("variant", SAFE)
-@pytest.mark.parametrize(
-    "case",
-    [
-        Case("straight", "bending", bent(X, -X, dtype=np.float32)),
-        Case("deviation 1e-6", "bending", bent(X, towards(1e-6), dtype=np.float32)),
-        Case("bent", "bending", bent(GENERIC, Y - Z, dtype=np.float32)),
-        Case("pi less 1e-4", "bending", bent(X, towards(1e-4, "pi"), dtype=np.float32)),
-        Case("offset 1e4", "bending", bent(X, towards(0.5), 1e4 * FAR, dtype=np.float32)),
-        Case("right angle and 1e-6", "shear", sheared(X, turned(Turn("pi/2", 1e-6)), dtype=np.float32)),
-        Case("near 0 by 1e-4", "shear", sheared(X, turned(Turn("0", 1e-4)), dtype=np.float32)),
-        Case("strain 1e-6", "stretch", stretched(GENERIC, 13 * (1 - 1e-6), dtype=np.float32)),
-    ],
-    ids=lambda case: f"{case.energy}-{case.name}".replace(" ", "_"),
-)
-def test_single_precision(case: Case, variant: str) -> None:
-    """The same limits, in units of single precision, against the truth at the exact single-precision inputs."""
-    module = kernel(case.energy, variant)
-    assert {array.dtype for array in outputs(module, case.element)} == {np.dtype(np.float32)}
-    assert judge(module, declared(case.energy), case.element).flaws == ()
-
-
-# -- one bad element among many ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("variant", (*SAFE, "differentiated"))
-@pytest.mark.parametrize("function", ["energy", "gradient"])
-def test_one_bad_element_among_a_million(variant: str, function: str) -> None:
-    module = kernel("stretch", variant)
-    n, bad = 10**6, 654_321
-    q = np.repeat(REGULAR["stretch"].q, n, axis=1)
-    q[3] += np.linspace(0, 1, n)
-    (good,) = (getattr(module, function)(q, k_s=1.0),)
-    q[4, bad] = np.nan
-    with pytest.raises(ElementError) as caught:
-        getattr(module, function)(q, k_s=1.0)
-    assert str(caught.value) == f"stretch: element {bad}: x1.y is nan"
-    assert caught.value.elements.tolist() == [bad]
-    masked = getattr(module, function)(q, k_s=1.0, errors="mask")
-    assert np.isnan(masked[..., bad]).all()
-    others = np.arange(n) != bad
-    assert masked[..., others].tobytes() == good[..., others].tobytes()
-
-
-@EACH
-@ALL
-def test_several_bad_elements_each_for_its_reason(energy: str, variant: str) -> None:
-    """The first is named with its reason, all are listed, and the others keep their bits."""
-    module = kernel(energy, variant)
-    n = 20_000  # more than two chunks
-    q = np.repeat(REGULAR[energy].q, n, axis=1)
-    q[0] += np.linspace(0, 1e-2, n)
-    good = module.packed(q, **REGULAR[energy].parameters)
-    q[1, [19_999, 8_192]] = np.inf
-    q[0, 8_191] = -np.inf
-    with pytest.raises(ElementError) as caught:
-        module.packed(q, **REGULAR[energy].parameters)
-    assert str(caught.value) == f"{energy}: element 8191: {module.DOFS[0]} is -inf (and 2 more)"
-    assert caught.value.elements.tolist() == [8_191, 8_192, 19_999]
-    masked = module.packed(q, **REGULAR[energy].parameters, errors="mask")
-    others = np.delete(np.arange(n), [8_191, 8_192, 19_999])
-    for before, after in zip(good, masked, strict=True):
-        assert np.isnan(after[..., [8_191, 8_192, 19_999]]).all()
-        assert after[..., others].tobytes() == before[..., others].tobytes()
