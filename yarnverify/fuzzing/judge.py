@@ -169,7 +169,9 @@ def _compare(
     conditions = np.zeros(len(sizes))
     if limit.conditioning:
         known = output != "H"
-        conditions = condition(output, energy, points, true)[:, 0] if known else hessian_condition(energy, points, true, 0)
+        conditions = (
+            condition(output, energy, points, true)[:, 0] if known else hessian_condition(energy, points, true, 0)
+        )
     flaws = []
     for block, size, number in zip(errors.blocks, sizes, conditions, strict=True):
         allowed = limit.rounding + limit.conditioning * (number if np.isfinite(number) else np.inf)

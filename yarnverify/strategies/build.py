@@ -34,6 +34,9 @@ class Element:
         kind = "" if self.q.dtype == np.float64 else f', dtype="{self.q.dtype}"'
         return f'element("{rows}"{given}{kind})'
 
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
+        printer.text(repr(self))  # Hypothesis would print the arrays of a dataclass, rounded
+
 
 def _hexadecimal(value: float) -> str:
     """As ``float.hex``, without zeros at the end."""
