@@ -190,8 +190,9 @@ def test_scaling_by_powers_of_two_is_exact(energy: str, variant: str) -> None:
 
 
 @pytest.mark.parametrize("energy", ["bending", "shear"])
-@EVERY
+@SAME_BITS
 def test_swapping_the_two_ends_keeps_the_bits_of_the_energy(energy: str, variant: str) -> None:
+    """Of the other variants this cannot be asked: SymPy prints the terms of the two lengths in different orders."""
     module = kernel(energy, variant)
 
     @given(elements(module))
