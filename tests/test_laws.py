@@ -74,29 +74,23 @@ def test_hessians_are_symmetric_and_functions_agree(energy: str, variant: str) -
     law()
 
 
-@EACH
+@pytest.mark.parametrize("energy", ["stretch", "bending", "shear"])
 @EVERY
-def test_exact_translation_and_common_sliding_change_no_bit(energy: str, variant: str) -> None:
-    """On a grid of 2^-20 coordinates up to 2^21 are moved exactly, so that every difference stays what it was."""
+def test_an_exact_translation_changes_no_bit(energy: str, variant: str) -> None:
+    """On a grid of 2^-20 coordinates up to 2^21 are moved exactly, so that every edge stays what it was."""
     module = kernel(energy, variant)
-    points, sliding = rows_of(module)
+    points, _ = rows_of(module)
     steps = st.integers(-(2**40), 2**40).map(lambda step: step * 2.0**-20)
 
     @few
-    @given(
-        moderate(energy, ratio=length_ratios(1e-3, 1e3), offset=offsets(2.0**10)), st.tuples(steps, steps, steps, steps)
-    )
-    def law(element: Element, shift: tuple[float, ...]) -> None:
+    @given(moderate(energy, ratio=length_ratios(1e-3, 1e3), offset=offsets(2.0**10)), st.tuples(steps, steps, steps))
+    def law(element: Element, shift: tuple[float, float, float]) -> None:
         q = np.round(element.q * 2**20) / 2**20
-        parameters = dict(element.parameters)
-        if "d" in parameters:
-            parameters["d"] = round(parameters["d"] * 2**20) / 2**20
         moved = q.copy()
         for point in points:
-            moved[point, 0] += shift[:3]
-        moved[sliding] += shift[3]
-        before = with_value(module, Element(q, parameters))
-        assert bits(outputs(module, Element(moved, parameters))) == bits(before)
+            moved[point, 0] += shift
+        before = with_value(module, Element(q, element.parameters))
+        assert bits(outputs(module, Element(moved, element.parameters))) == bits(before)
 
     law()
 

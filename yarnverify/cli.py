@@ -214,6 +214,41 @@ def report(
     _finish(outcome, json_file)
 
 
+@app.command
+def fuzz(
+    energy: str | None = None,
+    /,
+    *,
+    time: Annotated[float, Parameter(help="Seconds, for all energies together.")] = 300.0,
+    variant: Annotated[str, Parameter(help="Which variant of the kernels.")] = "accurate",
+    seed: Annotated[int | None, Parameter(help="Of the drawn elements; a new one each time by default.")] = None,
+    json_file: Json = None,
+) -> None:
+    """Random search for elements at which a kernel breaks what it promises.
+
+    Parameters
+    ----------
+    energy
+        Name of an energy, such as bending; all of them by default.
+    """
+    from yarnverify.errors import NotRunError
+
+    try:
+        from yarnverify.fuzzing.command import fuzz as run
+    except ModuleNotFoundError as error:
+        if error.name != "hypothesis":
+            raise
+        raise NotRunError("the search needs Hypothesis: pip install 'yarnverify[fuzz]'") from None
+
+    with progress("searching") as advance:
+        lines, record = run(energy, variant, time, seed, advance)
+    shown = sys.stderr if _json(record, json_file) else sys.stdout
+    for line in lines:
+        print(line, file=shown)
+    if any(search["found"] for search in record):
+        sys.exit(1)
+
+
 def main() -> None:
     """Run the command line; bad input is one line on standard error and exit status 2."""
     from yarnverify.errors import InputError, NotRunError
