@@ -34,7 +34,8 @@ def condition(output: str, energy: Energy, points: Points, truth: Truth) -> Arra
     Returns
     -------
     array (blocks, n)
-        In the order of ``metrics.blocks_of``; 0 where nothing changes, NaN where there are no derivatives.
+        In the order of ``metrics.blocks_of``; 0 where nothing changes, NaN where there are no derivatives. Infinite for an
+        energy of zero that any change lifts to the second order, as it is on every way there.
     """
     rows = points.rows()
     found = []
@@ -42,6 +43,8 @@ def condition(output: str, energy: Energy, points: Points, truth: Truth) -> Arra
         for _, place in blocks_of(output, energy.unknowns):
             if output == "E":
                 change = np.abs(truth.energy_slopes * rows).sum(axis=0)
+                bend = np.abs(truth.gradient_slopes * rows).sum(axis=(0, 1))
+                change = np.where((truth.energy == 0) & (change == 0) & (bend > 0), np.inf, change)
                 size = np.abs(truth.energy)
             else:
                 slopes = truth.gradient_slopes[place[0]]

@@ -4,8 +4,8 @@ Shares no code with the SymPy derivation or with the kernels: the declared energ
 (``yarnverify.symbolic.forward``), which enclose the true values whatever the precision.
 
 Where a state has no value, no precision helps. The largest precision tried is a proof for energies of lengths and angles:
-a difference of doubles that is not zero exceeds 2^-1075 and lengths stay below 2^1026, so that 1 - cos^2 of an angle is
-zero or above 2^-9000.
+a difference of doubles that is not zero exceeds 2^-1075 and lengths stay below 2^1026, so that the squared sine of an angle
+between them is zero or above 2^-8500.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from yarnverify.symbolic.numbers import Balls, UndefinedError
 from yarnverify.symbolic.tree import Name
 
 Array = NDArray[Any]
-BITS = (256, 512, 1024, 2048, 4096, 8192, 16384, 32768)
+BITS = (256, 512, 1536, 4096, 16384)  # a true zero is settled by 1536, being below 2^-1200
 _SPARE = 70  # bits of a value that must be known, so that an error of a thousandth of a rounding is seen
 _TIE = 4 * _SPARE  # bits of a value from which on it is taken for one half way between two doubles
 _SMALLEST = 2.0**-1022
