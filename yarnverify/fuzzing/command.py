@@ -10,7 +10,7 @@ from typing import Any
 
 from yarnverify.errors import InputError
 from yarnverify.fuzzing.judge import limit_of
-from yarnverify.fuzzing.search import Search, energies, search
+from yarnverify.fuzzing.search import ENERGIES, Search, search
 
 
 def fuzz(
@@ -44,7 +44,7 @@ def fuzz(
     if not 0 < seconds < math.inf:
         raise InputError(f"--time must be a positive number of seconds, not {seconds}")
     seed = random.SystemRandom().randrange(10**6) if seed is None else seed
-    names = energies() if energy is None else (energy,)
+    names = ENERGIES if energy is None else (energy,)
     end = time.monotonic() + seconds
     searches = []
     for number, name in enumerate(names):
@@ -64,7 +64,9 @@ def _lines(found: Search) -> list[str]:
     allowed = f"{limit.rounding:g} u" + (f" + {limit.conditioning:g} u x condition" if limit.conditioning else "")
     count = len(found.found)
     outcome = "nothing found" if not count else f"{count} {'kind' if count == 1 else 'kinds'} of flaw found"
-    lines = [f"{found.energy}, {found.variant}: {outcome} in {found.cases} elements (seed {found.seed}, limit {allowed})"]
+    lines = [
+        f"{found.energy}, {found.variant}: {outcome} in {found.cases} elements (seed {found.seed}, limit {allowed})"
+    ]
     lines += [f"  {number:>7} {name}" for name, number in found.regimes.items()]
     if found.worst_element is not None:
         lines.append(f"  largest error {found.worst:.3g} u at {found.worst_element!r}")

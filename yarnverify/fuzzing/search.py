@@ -15,9 +15,11 @@ from hypothesis import HealthCheck, Phase, Verbosity, given, seed, settings, tar
 from yarnverify.errors import InputError
 from yarnverify.fuzzing.judge import Flaw, Judgement, declared, judge, limit_of
 from yarnverify.fuzzing.labels import labels
+from yarnverify.kernels import VARIANTS
 from yarnverify.strategies import Element, elements
 from yarnverify.symbolic.declare import Energy
 
+ENERGIES = ("stretch", "bending", "shear", "parallel_contact")
 _ROUND = 500  # elements that Hypothesis draws before it starts afresh with the next seed
 _SHRINKING = 1500  # elements that are tried to make a found case plainer
 
@@ -183,19 +185,9 @@ def search(
     )
 
 
-def energies() -> tuple[str, ...]:
-    """Names of the kernels, in reading order."""
-    from yarnverify import kernels
-
-    return tuple(name for name in ("stretch", "bending", "shear", "parallel_contact") if name in kernels.__all__)
-
-
 def _kernel(energy: str, variant: str) -> Any:
-    from yarnverify import kernels
-
-    variants = getattr(kernels, "VARIANTS", ("printed", "differentiated"))
-    if variant not in variants:
-        raise InputError(f"there is no variant {variant!r}; one of {', '.join(variants)}")
+    if variant not in VARIANTS:
+        raise InputError(f"there is no variant {variant!r}; one of {', '.join(VARIANTS)}")
     return importlib.import_module(f"yarnverify.kernels.{variant}.{energy}")
 
 
