@@ -1,4 +1,4 @@
-"""The command line: ``yarnverify prove | derive | generate | accuracy | report``.
+"""The command line: ``yarnverify prove | derive | generate | accuracy | fuzz | report``.
 
 Exit status: 0 all as expected; 1 a check failed, or an erratum is new or stale; 2 bad usage or input; 3 asked for but
 could not run. Heavy imports happen inside the commands, so that ``--help`` answers at once.

@@ -69,5 +69,5 @@ def _lines(found: Search) -> list[str]:
     ]
     lines += [f"  {number:>7} {name}" for name, number in found.regimes.items()]
     if found.worst_element is not None:
-        lines.append(f"  largest error {found.worst:.3g} u at {found.worst_element!r}")
+        lines.append(f"  largest error {found.worst:.3g} of its limit, at {found.worst_element!r}")
     return [*lines, *(case.line for case in found.found)]
