@@ -20,6 +20,7 @@ from yarnverify.fuzzing.judge import declared, judge, limit_of, points_of
 from yarnverify.kernels.runtime import CHUNK
 from yarnverify.strategies import (
     Element,
+    element,
     elements,
     length_ratios,
     magnitudes,
@@ -358,3 +359,67 @@ def test_errors_in_single_precision(energy: str, variant: str) -> None:
         assert [flaw.text for flaw in judge(module, declared(energy), element).flaws] == []
 
     law()
+
+
+# Found by ``yarnverify fuzz``, where they broke the variant that is named.
+FOUND = [
+    # accurate: H x0,x0 and H x0,x1 above 16 u; nearly perpendicular edges of equal length, far away
+    (
+        "bending",
+        element(
+            "0x1.078p+19 0x0p+0 0x1.1p+3 0x1.077ff8b2260ddp+19 0x1.eafddafe4946dp-1 0x1.035021fa08491p+3"
+            " 0x1.0780091bd5a7cp+19 -0x1.547e4cf273bcbp-2 0x1.e209cf12e444dp+2 0x1.07800d999999ap+19 0x1.078p+19",
+            k_b="0x1p+0",
+        ),
+    ),
+    # fast: taken for a fold, which it is not: the cross product rounds to zero
+    (
+        "bending",
+        element(
+            "0x0p+0 0x0p+0 0x0p+0 -0x1.3333333333333p-1 0x1.999999999999ap-1 0x0p+0 -0x1.4666666666666p-1"
+            " 0x1.b333333333334p-1 0x0p+0 0x1.08p+1 0x0p+0",
+            k_b="0x1p+0",
+        ),
+    ),
+    # reference: H x0,x0 above 1 u
+    (
+        "bending",
+        element(
+            "0x0p+0 0x0p+0 0x1.00000000000d6p-2 0x1.6a915234fab0fp-5 0x0p+0 0x1.3fbfc8081c77bp+0 0x1.813a67584a5bfp-4"
+            " 0x0p+0 0x1.2fbbc4889e3d4p+1 0x1.900000000014ep+1 0x0p+0",
+            k_b="0x1p+0",
+        ),
+    ),
+    # fast: refused, although phi differs from pi by 1e-300 and the Hessian fits
+    (
+        "shear",
+        element(
+            "0x0p+0 0x0p+0 0x0p+0 0x0p+0 -0x1.ep+43 0x0p+0 -0x1.052e23183a15dp-935 0x1.86p+61 0x0p+0",
+            k_x="0x1.00000000001a6p-11",
+            L="0x1.00000000001a6p-15",
+        ),
+    ),
+    # accurate and fast: right angle nearer than 1e-15, from a generic frame
+    (
+        "shear",
+        element(
+            "0x0p+0 0x0p+0 0x0p+0 0x1.e530d560b9b8dp+0 -0x1.8b19dc2772f47p-2 0x1.d24e4ed0530ecp-4 0x1.f41903955e071p-3"
+            " 0x1.0e5e893a7d97cp+1 0x1.8bfc0af04f02bp+1",
+            k_x="0x1p+0",
+            L="0x1p+0",
+        ),
+    ),
+    # reference: E above 1 u, strain 1e-17
+    (
+        "stretch",
+        element("0x0p+0 0x0p+0 0x0p+0 0x1.554cdc874f7d7p-1 0x0p+0 0x1.7da6e0a2850dap-1 0x0p+0 0x1p+0", k_s="0x1p+0"),
+    ),
+    # fast: on the wrong side of the contact distance
+    ("parallel_contact", element("0x1.000001cbe9039p+1 0x1.40000072fa40ep+3", k_c="0x1p-3", L="0x1p-3", d="0x1p+3")),
+]
+
+
+@pytest.mark.parametrize(("energy", "found"), FOUND)
+@pytest.mark.parametrize("variant", PORTABLE)
+def test_cases_that_a_search_found(energy: str, found: Element, variant: str) -> None:
+    assert [flaw.text for flaw in judge(kernel(energy, variant), declared(energy), found).flaws] == []
