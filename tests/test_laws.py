@@ -229,8 +229,8 @@ def test_a_batch_of_one_has_the_bits_of_a_batch_of_many(energy: str, variant: st
     def law(batch: list[Element]) -> None:
         q, parameters = joined(batch)
         whole = module.packed(q, **parameters, errors="mask")
-        for i, element in enumerate(batch):
-            one = outputs(module, element, "packed", errors="mask")
+        for i, single in enumerate(batch):
+            one = outputs(module, single, "packed", errors="mask")
             assert bits(one) == [np.ascontiguousarray(array[..., i : i + 1]).tobytes() for array in whole]
 
     law()
