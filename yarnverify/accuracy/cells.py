@@ -177,7 +177,8 @@ def _share(target: str, output: str, errors: Errors, conditions: _Conditions) ->
         share = math.inf
         for draws in (1, 0):  # a bound from below is cheaper, and often enough
             amplification = np.nan_to_num(conditions.at(output, int(point), draws if output == "H" else 0), nan=0.0)
-            share = float((column / (EXACT + AMPLIFIED * amplification)).max())
+            with np.errstate(over="ignore"):  # an infinite condition allows any finite error
+                share = float(np.where(np.isinf(column), np.inf, column / (EXACT + AMPLIFIED * amplification)).max())
             if share <= 1 or output != "H":
                 break
         if share > worst:

@@ -130,42 +130,39 @@ def total(low: Any, *terms: Any) -> Any:
 
 # -- corners: two edges from one point --------------------------------------------------------------------------------
 
-Corner = tuple[Any, Any, Vector, Vector, Vector, Any]
+Corner = tuple[Any, Any, Vector, Vector, Vector, Any, Any]
 
 
-def _corner(a: Vector, b: Vector, normal: Vector) -> tuple[Any, Any, Vector, Vector, Vector]:
+def _corner(a: Vector, b: Vector, normal: Vector, cosine: Any = None) -> Corner:
     square_a, square_b = dot(a, a), dot(b, b)
     length_a, length_b = sqrt(square_a), sqrt(square_b)
-    both = 1 / sqrt(square_a * square_b)  # two roundings fewer than the product of two inverses
-    return length_a, length_b, scaled(a, 1 / length_a), scaled(b, 1 / length_b), scaled(normal, both)
+    scale = 1 / sqrt(square_a * square_b)  # two roundings fewer than the product of two inverses
+    d_a, d_b = scaled(a, 1 / length_a), scaled(b, 1 / length_b)
+    return length_a, length_b, d_a, d_b, normal, scale, dot(d_a, d_b) if cosine is None else cosine * scale
 
 
 def corner(origin: Vector, end_a: Vector, end_b: Vector) -> Corner:
-    """Lengths and directions of two edges, the cross product and the scalar product of the directions."""
+    """Two edges: their lengths and directions, their cross product, 1 over the product of lengths, the cosine between them."""
     a, b = edge(origin, end_a), edge(origin, end_b)
-    length_a, length_b, d_a, d_b, m = _corner(a, b, cross(a, b))
-    return length_a, length_b, d_a, d_b, m, dot(d_a, d_b)
+    return _corner(a, b, cross(a, b))
 
 
 def corner_exact(origin: Vector, end_a: Vector, end_b: Vector) -> Corner:
     """As ``corner``, the cross product without loss where the edges are nearly parallel."""
     (a, a_low), (b, b_low) = edge_exact(origin, end_a), edge_exact(origin, end_b)
-    length_a, length_b, d_a, d_b, m = _corner(a, b, cross_exact(a, a_low, b, b_low))
-    return length_a, length_b, d_a, d_b, m, dot(d_a, d_b)
+    return _corner(a, b, cross_exact(a, a_low, b, b_low))
 
 
 def right_corner(origin: Vector, end_a: Vector, end_b: Vector) -> Corner:
-    """As ``corner``, the scalar product that of the edges, whose products are nearer to exact."""
+    """As ``corner``, the cosine from the scalar product of the edges, whose products are nearer to exact."""
     a, b = edge(origin, end_a), edge(origin, end_b)
-    length_a, length_b, d_a, d_b, m = _corner(a, b, cross(a, b))
-    return length_a, length_b, d_a, d_b, m, dot(a, b) * (1 / length_a) * (1 / length_b)
+    return _corner(a, b, cross(a, b), dot(a, b))
 
 
 def right_corner_exact(origin: Vector, end_a: Vector, end_b: Vector) -> Corner:
-    """As ``corner_exact``, the scalar product too without loss where the edges are nearly perpendicular."""
+    """As ``corner_exact``, the cosine too without loss where the edges are nearly perpendicular."""
     (a, a_low), (b, b_low) = edge_exact(origin, end_a), edge_exact(origin, end_b)
-    length_a, length_b, d_a, d_b, m = _corner(a, b, cross_exact(a, a_low, b, b_low))
-    return length_a, length_b, d_a, d_b, m, dot_exact(a, a_low, b, b_low) * (1 / length_a) * (1 / length_b)
+    return _corner(a, b, cross_exact(a, a_low, b, b_low), dot_exact(a, a_low, b, b_low))
 
 
 def normal_of(m: Vector) -> tuple[Vector, Any]:

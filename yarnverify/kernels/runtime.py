@@ -411,15 +411,23 @@ class _Run:
     # -- scale
 
     def _exponents(self, rows: Array) -> Array:
-        """For each element a power of two that brings its longest edge near 1; 0 where it is moderate as it is."""
+        """For each element the power of two to divide lengths by; 0 where they are moderate as they are.
+
+        Where only angles count, edges are made so long that their products with the smallest number do not underflow.
+        """
         kernel = self.kernel
         if not kernel.points or not kernel.portable:
             return np.zeros(rows.shape[1], int)
         points = rows[list(kernel.points)].reshape(-1, 3, rows.shape[1])
-        span = np.abs(points - points[:1]).max(axis=(0, 1))
-        exponent = np.where(np.isfinite(span), np.frexp(span)[1], 0)
-        most = int(math.log2(self.limit)) // 2
-        return np.where(np.abs(exponent) > most, exponent, 0)
+        spans = np.abs(points[1:] - points[:1]).max(axis=1)
+        span = spans.max(axis=0)
+        most = int(math.log2(self.limit))
+        if kernel.scaling == "points":
+            span = np.where(spans > 0, spans, np.inf).min(axis=0)
+        exponent = np.where(np.isfinite(span) & (span > 0), np.frexp(span)[1], 0)
+        if kernel.scaling == "points":
+            return exponent - 2
+        return np.where(np.abs(exponent) > most // 2, exponent, 0)
 
     def _scaled(self, rows: Array, values: list[Any], exponent: Array) -> tuple[Array, list[Any]]:
         if not exponent.any():

@@ -380,7 +380,7 @@ _FUNCTIONS = {
     "tape": LIBRARY | {"power", "select", "sqrt"},
  "geometry": {
         "PI", "angle", "closing", "corner", "corner_exact", "deviation", "dot", "half_tangent", "normal_of", "right_corner",
-        "right_corner_exact", "segment", "segment_exact", "total", "turning", "versine",
+        "right_corner_exact", "scaled", "segment", "segment_exact", "total", "turning", "versine",
     },
 }  # fmt: skip
 

@@ -54,11 +54,12 @@ def safe_program(energy: Energy, safe: Safe, exact: bool, alone: bool) -> Progra
     if safe.corner is not None and safe.shape == "polar":
         ends = "0 or pi" if alone else "0" if safe.corner.sign > 0 else "pi"
         text = f"{safe.corner.symbol} is {ends}, where the energy has no derivative"
-        checks.append((_symbol(safe.corner.name("s")), "derivatives", text))
+        checks.append((_symbol(safe.corner.name("size")), "derivatives", text))
     lengths = {_symbol(m.a.l.name): _low(m.a) for m in safe.lengths}
-    made = settled(
-        reading.steps, value, gradient, hessian, checks, choice, _totals(energy, lengths) if exact else lambda v: v
-    )
+    totals = _totals(energy, lengths)
+    if choice is not None:
+        choice = totals(sp.sympify(choice))  # whether an energy acts is a jump: never a matter of rounding
+    made = settled(reading.steps, value, gradient, hessian, checks, choice, totals if exact else lambda v: v)
     code = [*made.steps.values(), *made.outputs]
     used = {str(symbol) for step in code for symbol in step.free_symbols}
     prologue = tuple(_prologue(safe, exact, used))
@@ -132,17 +133,20 @@ def _corner_lines(safe: Safe, corner: Corner, exact: bool, used: set[str]) -> li
     kind = ("right_corner" if safe.centred else "corner") + ("_exact" if exact else "")
     l_a, l_b, d_a, d_b = (identifier(symbol.name) for symbol in (a.l, b.l, a.d, b.d))
     ends = f"{a.head.label}, {b.head.label}"
-    lines = [f"{l_a}, {l_b}, {d_a}, {d_b}, {vector('m')}, {atom('C')} = {kind}({a.tail.label}, {ends})"]
+    targets = f"{l_a}, {l_b}, {d_a}, {d_b}, {vector('normal')}, {atom('scale')}, {atom('C')}"
+    lines = [f"{targets} = {kind}({a.tail.label}, {ends})"]
     lines += [_unpacked(name) for name in (a.d.name, b.d.name)]
     cosine = atom("C") if corner.sign > 0 else f"-{atom('C')}"
     if safe.shape == "smooth":
+        lines.append(f"{vector('m')} = scaled({vector('normal')}, {atom('scale')})")
         lines.append(_unpacked(corner.name("m", bold=True)))
         lines.append(f"{atom('S')} = dot({vector('m')}, {vector('m')})")
         lines.append(f"{atom('A')}, {atom('f')}, {atom('g')} = turning({atom('S')}, {cosine})")
         if atom("versine") in used:
             lines.append(f"{atom('versine')} = versine({atom('S')}, {cosine})")
         return lines
-    lines.append(f"{vector('n')}, {atom('s')} = normal_of({vector('m')})")
+    lines.append(f"{vector('n')}, {atom('size')} = normal_of({vector('normal')})")
+    lines.append(f"{atom('s')} = {atom('size')}*{atom('scale')}")
     lines.append(_unpacked(corner.name("n", bold=True)))
     theta = str(_symbol(corner.symbol))
     functions = {theta: "angle", atom("psi"): "deviation", atom("half"): "half_tangent"}
