@@ -139,7 +139,7 @@ def promised(energy: str, variant: str, element: Element) -> float:
     size = abs(true.energy[0])
     if variant in PORTABLE:
         limit = limit_of(variant)
-        change = float(np.abs(true.energy_slopes[:, 0] * points.rows()[:, 0]).sum()) if limit.conditioning else 0.0
+        change = float(np.abs(true.energy_moves[:, 0]).sum()) if limit.conditioning else 0.0
         return U * (limit.rounding * size + limit.conditioning * change)
     # Formulas in terms of the cosine, or of the stretch: a few roundings of that, and what they do to the energy.
     at = q[:, 0]
