@@ -81,7 +81,7 @@ def test_the_second_reading_shares_no_code_with_the_first() -> None:
 def test_nothing_heavy_is_imported_for_help() -> None:
     code = (
         "import sys; from yarnverify.cli import app; import yarnverify.kernels.runtime\n"
-        "print(sorted({'sympy', 'lark', 'flint', 'rich.table', 'jinja2', 'matplotlib'} & set(sys.modules)))"
+        "print(sorted({'sympy', 'lark', 'flint', 'rich.table', 'jinja2', 'matplotlib', 'hypothesis'} & set(sys.modules)))"
     )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert shown.strip() == "[]"

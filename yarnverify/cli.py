@@ -1,4 +1,4 @@
-"""The command line: ``yarnverify prove | derive | generate | accuracy | report``.
+"""The command line: ``yarnverify prove | derive | generate | accuracy | fuzz | report``.
 
 Exit status: 0 all as expected; 1 a check failed, or an erratum is new or stale; 2 bad usage or input; 3 asked for but
 could not run. Heavy imports happen inside the commands, so that ``--help`` answers at once.
@@ -212,6 +212,41 @@ def report(
     with progress("reporting") as advance:
         outcome = build_report(out, check, advance)
     _finish(outcome, json_file)
+
+
+@app.command
+def fuzz(
+    energy: str | None = None,
+    /,
+    *,
+    time: Annotated[float, Parameter(help="Seconds, for all energies together.")] = 300.0,
+    variant: Annotated[str, Parameter(help="Which variant of the kernels.")] = "accurate",
+    seed: Annotated[int | None, Parameter(help="Of the drawn elements; a new one each time by default.")] = None,
+    json_file: Json = None,
+) -> None:
+    """Random search for elements at which a kernel breaks what it promises.
+
+    Parameters
+    ----------
+    energy
+        Name of an energy, such as bending; all of them by default.
+    """
+    from yarnverify.errors import NotRunError
+
+    try:
+        from yarnverify.fuzzing.command import fuzz as run
+    except ModuleNotFoundError as error:
+        if error.name != "hypothesis":
+            raise
+        raise NotRunError("the search needs Hypothesis: pip install 'yarnverify[fuzz]'") from None
+
+    with progress("searching") as advance:
+        lines, record = run(energy, variant, time, seed, advance)
+    shown = sys.stderr if _json(record, json_file) else sys.stdout
+    for line in lines:
+        print(line, file=shown)
+    if any(search["found"] for search in record):
+        sys.exit(1)
 
 
 def main() -> None:

@@ -1,0 +1,220 @@
+"""One element against the truth: too large an error, NaN, a warning, a refusal without reason, or none with reason."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from yarnverify.accuracy.conditioning import condition, hessian_condition
+from yarnverify.accuracy.metrics import UNIT, Errors, measure
+from yarnverify.accuracy.truth import Points, Truth, truth
+from yarnverify.errors import InputError
+from yarnverify.kernels import ElementError
+from yarnverify.strategies import Element
+from yarnverify.symbolic.declare import Energy
+from yarnverify.symbolic.tree import Name
+
+Array = NDArray[Any]
+Kind = Literal["error", "not finite", "warning", "refused", "accepted"]
+Output = Literal["E", "G", "H"]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What the error of a block may be, in its norm: ``rounding + conditioning * condition number``, in units u."""
+
+    rounding: float
+    conditioning: float = 0.0
+
+
+# Variants that promise nothing are held to what plain arithmetic on safe formulas can reach.
+_PLAIN = Limit(16.0, 8.0)
+LIMITS = {"accurate": Limit(16.0), "fast": _PLAIN, "reference": Limit(1.0)}
+
+
+@dataclass(frozen=True)
+class Flaw:
+    """Something that is wrong at one element.
+
+    Attributes
+    ----------
+    kind
+        ``error`` above its limit; ``not finite``, a NaN or infinity where the truth is finite; ``warning``; ``refused``, an
+        ``ElementError`` where there is a value; ``accepted``, none where there is no value.
+    where
+        Output and block, such as ``H x1,u1``.
+    text
+        One line to be read.
+    size
+        How far off, to steer a search: the error as a multiple of its limit.
+    """
+
+    kind: Kind
+    where: str
+    text: str
+    size: float = np.inf
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What is wrong, and the largest error as a multiple of its limit."""
+
+    flaws: tuple[Flaw, ...]
+    worst: float
+
+
+_REST = 1e-16  # nearer to rest than this, relative to its size, an element is outside of what ``accurate`` is made for
+
+
+def limit_of(variant: str) -> Limit:
+    """The limit of a variant, in the range that it is made for."""
+    return LIMITS.get(variant, _PLAIN)
+
+
+def _limit_at(variant: str, energy: Energy, points: Points, true: Truth) -> Limit:
+    """The limit of a variant at a state: so near to rest that the deviation drowns in the errors of errors, as for ``fast``."""
+    if variant == "accurate" and true.has_derivatives[0] and 0 < _from_rest(energy.unknowns, points, true) < _REST:
+        return _PLAIN
+    return limit_of(variant)
+
+
+def _from_rest(unknowns: Sequence[Name], points: Points, true: Truth) -> float:
+    """Relative deviation from rest: the root of the energy over what the second derivatives make of the element's size."""
+    moved = np.zeros(points.q.shape[0])
+    first: dict[bool, Array] = {}  # differences to the first point and to the first sliding coordinate
+    at = 0
+    for name in unknowns:
+        rows = slice(at, at + 3 if name.bold else at + 1)
+        at = rows.stop
+        here = points.q[rows, 0]
+        moved[rows] = np.abs(here - first.setdefault(name.bold, here))
+    with np.errstate(all="ignore"):
+        return float(np.sqrt(2 * np.abs(true.energy[0]) / (moved @ np.abs(true.hessian[..., 0]) @ moved)))
+
+
+@cache
+def declared(name: str) -> Energy:
+    """The declared energy of a kernel.
+
+    Raises
+    ------
+    InputError
+        For a name that nothing declares.
+    """
+    from yarnverify.library import derivations
+    from yarnverify.symbolic.declare import load_declarations
+
+    energies = {energy.name: energy for energy in load_declarations(derivations()).energies}
+    if name not in energies:
+        raise InputError(f"there is no energy {name!r}; one of {', '.join(sorted(energies))}")
+    return energies[name]
+
+
+def points_of(elements: Iterable[Element]) -> Points:
+    """Elements as the points at which they are evaluated: parameters as the kernel rounds them to the type of ``q``."""
+    given = list(elements)
+    dtype = given[0].q.dtype
+    names = given[0].parameters
+    parameters = {name: np.array([one.parameters[name] for one in given]).astype(dtype) for name in names}
+    q = np.concatenate([one.q for one in given], axis=1).astype(np.float64)
+    return Points(q, {name: value.astype(np.float64) for name, value in parameters.items()})
+
+
+def judge(module: Any, energy: Energy, element: Element) -> Judgement:
+    """Compare a kernel with the truth at one element.
+
+    Parameters
+    ----------
+    module
+        A kernel, with ``VARIANT``, ``energy`` and ``evaluate``.
+    energy
+        Its declaration.
+    element
+        float64 or float32.
+    """
+    points = points_of([element])
+    true = truth(energy, points)
+    fits = [_fits(array, element.q.dtype) for array in (true.energy, true.gradient, true.hessian)]
+    flaws: list[Flaw] = []
+    worst = 0.0
+    calls: list[tuple[Any, str, bool]] = [
+        (module.energy, "E", bool(true.has_energy[0]) and fits[0]),
+        (module.evaluate, "EGH", bool(true.has_derivatives[0]) and all(fits)),
+    ]
+    for function, outputs, has_value in calls:
+        found, flaw = _call(function, element, has_value)
+        if flaw is not None:
+            flaws.append(flaw)
+        if found is None or not has_value:
+            continue
+        for output, computed in zip(outputs, found, strict=True):
+            wrong, size = _compare(module.VARIANT, energy, points, true, output, computed)
+            flaws += wrong
+            worst = max(worst, size)
+    return Judgement(tuple(dict.fromkeys(flaws)), worst)
+
+
+def _fits(array: Array, dtype: Any) -> bool:
+    with np.errstate(over="ignore"):
+        return bool(np.isfinite(array.astype(dtype)).all())
+
+
+def _call(function: Any, element: Element, has_value: bool) -> tuple[list[Array] | None, Flaw | None]:
+    q, parameters = element
+    name = function.__name__
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            found = function(q, **parameters)
+    except ElementError as error:
+        return None, Flaw("refused", name, f"{name} is refused where it has a value: {error}") if has_value else None
+    except Warning as warning:
+        return None, Flaw("warning", name, f"{name} warns: {warning}")
+    if not has_value:
+        return None, Flaw("accepted", name, f"{name} gives numbers where there is no value in this format")
+    return list(found) if isinstance(found, tuple) else [found], None
+
+
+def _compare(
+    variant: str, energy: Energy, points: Points, true: Truth, output: str, computed: Array
+) -> tuple[list[Flaw], float]:
+    """Flaws of one output, and its largest error as a multiple of its limit."""
+    limit = _limit_at(variant, energy, points, true)
+    errors: Errors = measure(output, computed, true, energy.unknowns, str(computed.dtype))
+    sizes = errors.normwise[:, 0]
+    worst = float(np.nanmax(sizes, initial=0.0)) / limit.rounding
+    if worst <= 1:
+        return [], worst
+    conditions = np.zeros(len(sizes))
+    if limit.conditioning:
+        conditions = np.nan_to_num(_conditions(output, energy, points, true, limit, str(computed.dtype)), nan=np.inf)
+    flaws, worst = [], 0.0
+    for block, size, number in zip(errors.blocks, sizes, conditions, strict=True):
+        allowed = limit.rounding + limit.conditioning * min(float(number), 1e300)
+        where = f"{output} {block}".strip()
+        worst = max(worst, float(size / allowed) if size == size else 0.0)  # NaN: the truth does not fit
+        if size == np.inf:
+            flaws.append(Flaw("not finite", where, f"{where} is not finite where the truth is"))
+        elif size > allowed:
+            text = f"{where} is wrong by {size:.3g} u, allowed are {allowed:.3g} u"
+            flaws.append(Flaw("error", where, text, float(size / allowed)))
+    return flaws, worst
+
+
+def _conditions(output: str, energy: Energy, points: Points, true: Truth, limit: Limit, dtype: str) -> Array:
+    """Condition numbers of the blocks; that of the energy to second order, since at rest its gradient vanishes."""
+    if output == "H":
+        return hessian_condition(energy, points, true, 0)
+    first = condition(output, energy, points, true)[:, 0]
+    if output == "G":
+        return first
+    at = np.abs(points.q[:, 0])
+    with np.errstate(all="ignore"):
+        second = at @ np.abs(true.hessian[..., 0]) @ at / max(abs(true.energy[0]), float(np.finfo(dtype).tiny))
+        return first + limit.conditioning * UNIT[dtype] * second / 2
