@@ -224,21 +224,20 @@ def _half_angle(square: Any) -> tuple[Any, Any, Any]:
 def turning(sine_squared: Any, cosine: Any) -> tuple[Any, Any, Any]:
     """``t^2``, ``t/sin t`` and ``(sin t - t cos t)/sin(t)^3``, analytic at t = 0; for sines that do not vanish towards pi.
 
-    sin(t/2)^2 of the acute angle between the lines comes from the sine of small angles and from the cosine of large ones,
-    whichever settles it better; an obtuse t is pi less that angle, which adds positive terms to both functions.
+    sin(t/2)^2 comes from the sine of small angles and from the cosine of large ones, whichever settles it better; a t beyond
+    cos t = -1/4 is pi less another angle, which adds positive terms to both functions.
     """
-    size = abs(cosine)
-    square = 0.5 * select(size - 0.5, sine_squared / (1 + size), 1 - size)
+    open_side = cosine + 0.25  # beyond, t is pi less an angle; at a right angle that would cost digits
+    near = select(open_side, cosine, -cosine)
+    square = 0.5 * select(near - 0.5, sine_squared / (1 + near), 1 - near)
     half, f, g = _half_angle(square)
-    acute_f, acute_g = f / half, (half * g + f) / (4 * (half * half * half))
-    inverse = 1 / select(cosine, 1.0, sine_squared)
+    near_f, near_g = f / half, (half * g + f) / (4 * (half * half * half))
+    inverse = 1 / select(open_side, 1.0, sine_squared)
     straight = pi_like(square) * (sqrt(sine_squared) * inverse)  # pi/sin t
-    obtuse_f = straight - acute_f
-    of_t = select(cosine, acute_f, obtuse_f)
-    acute = 2 * (f * sqrt(square))
-    obtuse = pi_like(square) - acute
-    squared = select(cosine, 4 * (f * f * square), obtuse * obtuse)
-    return squared, of_t, acute_g + select(cosine, 0.0, straight * size * inverse)
+    far = pi_like(square) - 2 * (f * sqrt(square))
+    squared = select(open_side, 4 * (f * f * square), far * far)
+    over = select(open_side, near_f, straight - near_f)
+    return squared, over, near_g + select(open_side, 0.0, straight * near * inverse)
 
 
 def pi_like(value: Any) -> Any:

@@ -45,7 +45,7 @@ SUMMARY = {
     "printed": "the document's own formulas, misprints included",
 }
 VARIANTS = tuple(SUMMARY)
-_SERIES_TOP, _SERIES_DEGREE = Fraction(147, 1000), 12  # sin(t/4)^2 is 0.14645 for a right angle t
+_SERIES_TOP, _SERIES_DEGREE = Fraction(97, 500), 13  # sin(t/4)^2 is 0.1939 where cos t = -1/4
 
 
 def kernel_modules(
@@ -132,12 +132,11 @@ def derived_programs(energy: Energy, found: Proved, variant: str) -> tuple[list[
     if not found.shapes:
         note = "there is no safe form for this law; these are the differentiated formulas"
         return [derived_program(energy, found.derivation)], [note]
-    exact = variant == "accurate"
-    programs = [safe_program(energy, shape, exact, found.shapes) for shape in found.shapes]
     if variant == "fast" and found.shapes[-1].shape == "polar":
         # within rounding of a fold the plain cross product has no direction any more: there, and only there, the exact one
-        programs = [*programs[:1], safe_program(energy, found.shapes[-1], True, found.shapes)]
-    return programs, []
+        first = safe_program(energy, found.shapes[0], False, found.shapes, guarded=len(found.shapes) == 1)
+        return [first, safe_program(energy, found.shapes[-1], True, found.shapes)], []
+    return [safe_program(energy, shape, variant == "accurate", found.shapes) for shape in found.shapes], []
 
 
 def _require_proofs(what: str, found: dict[str, Finding]) -> None:

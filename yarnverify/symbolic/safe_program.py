@@ -29,7 +29,9 @@ _SMOOTH_UP_TO = sp.Rational(5, 8)  # cosine between the edges; beyond, the rows 
 _PLAIN_DOWN_TO = sp.Rational(1, 2**16)  # sine; a plain cross product keeps some 37 of 53 bits there
 
 
-def safe_program(energy: Energy, safe: Safe, exact: bool, shapes: tuple[Safe, ...]) -> Program:
+def safe_program(
+    energy: Energy, safe: Safe, exact: bool, shapes: tuple[Safe, ...], guarded: bool = False
+) -> Program:
     """The program of one shape.
 
     Parameters
@@ -40,6 +42,8 @@ def safe_program(energy: Energy, safe: Safe, exact: bool, shapes: tuple[Safe, ..
         Whether rounding errors of edges, products and sums are carried along.
     shapes
         All that the energy has.
+    guarded
+        Whether small sines are left to another program.
     """
     alone = len(shapes) == 1
     formulas = {block: tree for first, rest in safe.blocks(1) for block, tree in (first, *rest)}
@@ -57,7 +61,7 @@ def safe_program(energy: Energy, safe: Safe, exact: bool, shapes: tuple[Safe, ..
         ends = "0 or pi" if alone else "0" if safe.corner.sign > 0 else "pi"
         text = f"{safe.corner.symbol} is {ends}, where the energy has no derivative"
         checks.append((_symbol(safe.corner.name("size")), "derivatives", text))
-        if alone and not exact:
+        if guarded:
             choice = _symbol(safe.corner.name("s")) - _PLAIN_DOWN_TO
     lengths = {_symbol(m.a.l.name): _low(m.a) for m in safe.lengths}
     totals = _totals(energy, lengths)
@@ -67,7 +71,8 @@ def safe_program(energy: Energy, safe: Safe, exact: bool, shapes: tuple[Safe, ..
     code = [*made.steps.values(), *made.outputs]
     used = {str(symbol) for step in code for symbol in step.free_symbols}
     prologue = tuple(_prologue(safe, exact, used))
-    return Program(made.steps, made.energy, made.gradient, made.hessian, made.checks, made.choice, prologue, safe.shape)
+    name = f"{safe.shape}_exact" if exact else safe.shape
+    return Program(made.steps, made.energy, made.gradient, made.hessian, made.checks, made.choice, prologue, name)
 
 
 def _symbol(name: Name) -> sp.Symbol:

@@ -30,7 +30,7 @@ DOFS = ("u0", "u1")
 PARAMETERS = ("k_c", "L", "d")
 
 
-def _smooth(q: Any, p: Any) -> Any:
+def _smooth_exact(q: Any, p: Any) -> Any:
     u0, u1 = q
     k_c, L, d = p
     t0 = total(0, d, u0, -u1)
@@ -61,7 +61,7 @@ KERNEL = runtime.Kernel(
     ),
     shapes=(
         runtime.Shape(
-            _smooth,
+            _smooth_exact,
             (
             ),
         ),

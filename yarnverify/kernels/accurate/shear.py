@@ -29,7 +29,7 @@ DOFS = ("x0.x", "x0.y", "x0.z", "x1.x", "x1.y", "x1.z", "x3.x", "x3.y", "x3.z")
 PARAMETERS = ("k_x", "L")
 
 
-def _polar(q: Any, p: Any) -> Any:
+def _polar_exact(q: Any, p: Any) -> Any:
     x0x, x0y, x0z, x1x, x1y, x1z, x3x, x3y, x3z = q
     k_x, L = p
     x0 = x0x, x0y, x0z
@@ -212,7 +212,7 @@ KERNEL = runtime.Kernel(
     ),
     shapes=(
         runtime.Shape(
-            _polar,
+            _polar_exact,
             (
                 ("energy", "the segment x0-x1 has length zero"),
                 ("energy", "the segment x0-x3 has length zero"),

@@ -28,7 +28,7 @@ DOFS = ("x0.x", "x0.y", "x0.z", "x1.x", "x1.y", "x1.z", "u0", "u1")
 PARAMETERS = ("k_s",)
 
 
-def _smooth(q: Any, p: Any) -> Any:
+def _smooth_exact(q: Any, p: Any) -> Any:
     x0x, x0y, x0z, x1x, x1y, x1z, u0, u1 = q
     k_s, = p
     x0 = x0x, x0y, x0z
@@ -122,7 +122,7 @@ KERNEL = runtime.Kernel(
     ),
     shapes=(
         runtime.Shape(
-            _smooth,
+            _smooth_exact,
             (
                 ("energy", "the segment x0-x1 has length zero"),
                 ("energy", "u1 > u0 does not hold"),
