@@ -1,0 +1,89 @@
+"""JAX: ``jit(vmap(...))`` of ``value_and_grad`` and a Hessian, in double precision on one core."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+# XLA reads both when JAX is first imported; whoever set them before is left alone
+os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
+os.environ.setdefault("JAX_PLATFORMS", "cpu")
+
+import jax
+import jax.numpy as jnp
+
+from yarnverify.benchmark.peers.walk import Functions, energy_of
+from yarnverify.benchmark.ways import Array, Outputs, Way, chunks, degrees_of_freedom, outputs_bytes
+from yarnverify.symbolic.declare import Energy
+
+PACKAGES = ("jax", "jaxlib")
+CHUNK = 4096
+_FUNCTIONS = Functions(
+    float,
+    np.pi,
+    jnp.sqrt,
+    jnp.abs,
+    {
+        "arccos": jnp.arccos,
+        "arcsin": jnp.arcsin,
+        "arctan": jnp.arctan,
+        "sin": jnp.sin,
+        "cos": jnp.cos,
+        "tan": jnp.tan,
+    },
+)
+_HESSIANS: tuple[tuple[str, Callable[..., Any]], ...] = (
+    ("hessian", jax.hessian),
+    ("jacfwd(jacfwd)", lambda f: jax.jacfwd(jax.jacfwd(f))),
+    ("jacrev(jacrev)", lambda f: jax.jacrev(jax.jacrev(f))),
+)
+
+
+def ways(energy: Energy) -> tuple[Way, ...]:
+    """Three orders of differentiation, each on the whole batch and in chunks."""
+    jax.config.update("jax_enable_x64", True)  # this process computes in double precision from here on
+    dof = degrees_of_freedom(energy)
+
+    def value(q: Any, values: Any) -> Any:
+        return energy_of(energy, list(q), list(values), _FUNCTIONS)
+
+    found = []
+    for name, hessian in _HESSIANS:
+        function = jax.jit(jax.vmap(_all(value, hessian(value)), in_axes=(1, None)))
+        for chunk in (None, CHUNK):
+            found.append(_way(name, function, chunk, dof, len(energy.parameters)))
+    return tuple(found)
+
+
+def _all(value: Callable[..., Any], hessian: Callable[..., Any]) -> Callable[..., Any]:
+    def outputs(q: Any, values: Any) -> Any:
+        energy, gradient = jax.value_and_grad(value)(q, values)
+        return energy, gradient, hessian(q, values)
+
+    return outputs
+
+
+def _way(name: str, function: Any, chunk: int | None, dof: int, parameters: int) -> Way:
+    def run(q: Array, values: tuple[float, ...]) -> Outputs:
+        n, given = q.shape[1], np.array(values)
+        if chunk is None or n <= chunk:
+            e, g, h = jax.block_until_ready(function(q, given))
+            return np.asarray(e), np.asarray(g), np.asarray(h)
+        out = np.empty(n), np.empty((n, dof)), np.empty((n, dof, dof))
+        for where in chunks(n, chunk):
+            for whole, part in zip(out, function(q[:, where], given), strict=True):
+                whole[where] = part
+        return out
+
+    def bytes_at(n: int) -> int:
+        m = n if chunk is None else min(n, chunk)
+        shapes = (jax.ShapeDtypeStruct((dof, m), np.float64), jax.ShapeDtypeStruct((parameters,), np.float64))
+        analysis = function.lower(*shapes).compile().memory_analysis()
+        own = int(analysis.temp_size_in_bytes) + int(analysis.output_size_in_bytes)
+        return own + n * outputs_bytes(dof, packed=False)
+
+    how = f"jit(vmap({name})), {f'chunks of {chunk}' if chunk else 'whole batch'}"
+    return Way(how, "full", "element-first", run, bytes_at)
