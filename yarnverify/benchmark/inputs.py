@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,7 @@ FUNCTIONS = Functions(
     },
 )
 STATES = ("mixed", "near rest")
+HARD = {"1e-4": 1e-4, "1e-8": 1e-8}  # distances, as they are written and as numbers
 MARGIN = 0.05  # by which ordinary states stay inside the domain
 
 
@@ -71,23 +73,20 @@ def timed_states(energy: Energy, state: str, n: int, seed: int = 0) -> Inputs:
     draw = np.random.default_rng(seed)
     if state == "mixed":
         return _mixed(energy, n, draw)
-    exponents = np.log10([1e-3, 1e-1])
-    return _near_rest(energy, n, draw, lambda count: 10.0 ** draw.uniform(*exponents, count))
+    return _near_rest(energy, n, draw, lambda count: 10.0 ** draw.uniform(-3, -1, count))
 
 
 def error_states(energy: Energy, n: int = 32, seed: int = 0) -> dict[str, Inputs]:
     """States on which errors are shown: ordinary ones, close to rest, and folded where the energy has an angle."""
     draw = np.random.default_rng(seed)
     found = {"mixed": _mixed(energy, n, draw)}
-    for size in (1e-4, 1e-8):
-        found[f"{size:.0e} from rest".replace("e-0", "e-")] = _near_rest(energy, n, draw, lambda m, s=size: np.full(m, s))
+    for name, size in HARD.items():
+        found[f"{name} from rest"] = _near_rest(energy, n, draw, partial(np.full, fill_value=size))
     angle = next(_angles(energy.expression), None)
-    if angle is not None:
-        for size in (1e-4, 1e-8):
-            name = f"{size:.0e} from a fold".replace("e-0", "e-")
-            folded = _folded(energy, angle, _mixed(energy, n, draw), size, draw)
-            if folded is not None:
-                found[name] = folded
+    for name, size in HARD.items():
+        folded = None if angle is None else _folded(energy, angle, _mixed(energy, n, draw), size, draw)
+        if folded is not None:
+            found[f"{name} from a fold"] = folded
     return found
 
 

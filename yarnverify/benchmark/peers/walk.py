@@ -163,5 +163,7 @@ def _multiply(a: Any, b: Any) -> Any:
         return _each(lambda x: a * x, b)
     if not isinstance(b, list):
         return _each(lambda x: x * b, a)
-    product: Matrix = [[reduce(add, (p * q for p, q in zip(row, col, strict=True))) for col in zip(*b, strict=True)] for row in a]
+    product: Matrix = [
+        [reduce(add, (p * q for p, q in zip(row, col, strict=True))) for col in zip(*b, strict=True)] for row in a
+    ]
     return product[0][0] if len(product) == len(product[0]) == 1 else product
