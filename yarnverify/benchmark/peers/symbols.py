@@ -24,7 +24,7 @@ def expressions(energy: Energy) -> tuple[list[Any], list[Any], list[Any]]:
     rows, parameters, value = energy_expression(energy)
     dof = len(rows)
     gradient = [sp.diff(value, row) for row in rows]
-    hessian = [sp.diff(gradient[i], rows[j]) for i in range(dof) for j in range(i, dof)]
+    hessian = [_regular(sp.diff(gradient[i], rows[j])) for i in range(dof) for j in range(i, dof)]
     return rows, parameters, [value, *gradient, *hessian]
 
 
@@ -34,3 +34,8 @@ def energy_expression(energy: Energy) -> tuple[list[Any], list[Any], Any]:
     rows = list(sp.symbols(f"q:{dof}", real=True))
     parameters = list(sp.symbols(f"p:{len(energy.parameters)}", real=True))
     return rows, parameters, energy_of(energy, rows, parameters, _FUNCTIONS)
+
+
+def _regular(value: Any) -> Any:
+    """Without the impulses at kinks of absolute values, where there is no second derivative and nothing to print them."""
+    return value.replace(sp.DiracDelta, lambda *args: sp.Integer(0))
