@@ -15,7 +15,7 @@ import pytest
 
 from yarnverify.accuracy.metrics import measure
 from yarnverify.benchmark import run
-from yarnverify.benchmark.contestants import contestants
+from yarnverify.benchmark.contestants import Contestant, contestants
 from yarnverify.benchmark.errors import errors_of, exact
 from yarnverify.benchmark.inputs import STATES, error_states, timed_states
 from yarnverify.benchmark.peers import PEERS
@@ -58,7 +58,7 @@ def test_every_round_times_everybody_and_starts_with_somebody_else() -> None:
     calls = {name: machine.call(name, 1.0) for name in "abc"}
     times = paired(calls, 4, clock=lambda: machine.now, least=0.5)
     assert times == {name: [1.0] * 4 for name in "abc"}
-    assert "".join(machine.calls) == "aabbcc" + "abc" + "bca" + "cab" + "abc"  # warm-up and trial, then the rounds
+    assert "".join(machine.calls) == "abc" + "abc" + "bca" + "cab" + "abc"  # a trial, then the rounds
 
 
 def test_short_calls_are_repeated_and_averaged() -> None:
@@ -67,11 +67,11 @@ def test_short_calls_are_repeated_and_averaged() -> None:
         {"short": machine.call("short", 0.25), "long": machine.call("long", 2.0)}, 1, lambda: machine.now, 1.0
     )
     assert times == {"short": [0.25], "long": [2.0]}
-    assert machine.calls.count("short") == 2 + 4 and machine.calls.count("long") == 2 + 1
+    assert machine.calls.count("short") == 1 + 4 and machine.calls.count("long") == 1 + 1
 
 
 def test_a_busy_moment_does_not_change_ratios() -> None:
-    machine = Machine(lambda calls: 5.0 if (calls - 4) // 2 == 1 else 1.0)  # the second round, after 4 calls to warm up
+    machine = Machine(lambda calls: 5.0 if (calls - 2) // 2 == 1 else 1.0)  # the second round, after two trials
     calls = {"slow": machine.call("slow", 3.0), "quick": machine.call("quick", 1.0)}
     times = paired(calls, 3, lambda: machine.now, 0.1)
     assert times == {"slow": [3.0, 15.0, 3.0], "quick": [1.0, 5.0, 1.0]}
@@ -79,7 +79,7 @@ def test_a_busy_moment_does_not_change_ratios() -> None:
 
 
 def test_ratios_are_taken_within_rounds() -> None:
-    """The median of ratios; the ratio of medians would be 2 in both cases."""
+    """The median of ratios; the ratio of medians would be 2 in the second case too."""
     ratios = speedups({"base": [2.0, 4.0, 30.0], "own": [1.0, 4.0, 2.0]}, "base")
     assert ratios["own"] == Spread(2.0, 1.0, 15.0)
     ratios = speedups({"base": [2.0, 4.0, 6.0], "own": [4.0, 1.0, 2.0]}, "base")
@@ -322,15 +322,24 @@ def test_what_did_not_run_is_shown_as_not_run(measured: dict[str, Any]) -> None:
     assert next(row for row in errors.rows if row[0] == "differences")[1].endswith("/ ∞")
 
 
-def test_what_needs_too_much_memory_is_left_out_and_said() -> None:
+def test_what_fails_or_needs_too_much_memory_is_left_out_and_said() -> None:
     def never(q: Any, values: Any) -> Any:
         raise AssertionError("must not be called")
 
     small = Way("small", "packed", "component-first", lambda q, values: empty_outputs(*q.shape), lambda n: 100 * n)
     large = Way("large", "packed", "component-first", never, lambda n: 10**9 * n)
     inputs = run.Inputs(np.zeros((2, 5)), ())
-    entry = run._timed({"small": small, "large": large}, inputs, 1)
-    assert entry["not_run"] == {"large": "needs 5.0 GB, more than 4"} and set(entry["ns"]) == {"small", run.FLOOR}
+    broken = Way("broken", "packed", "component-first", never, lambda n: n)
+    entry = run._timed({"small": small, "large": large, "broken": broken}, inputs, 1)
+    assert set(entry["ns"]) == {"small", run.FLOOR}
+    assert entry["not_run"] == {
+        "large": "needs 5.0 GB, more than 4",
+        "broken": "AssertionError: must not be called",
+    }
+    assert run._fastest(Contestant("both", "peer", (large, broken)), inputs) == "AssertionError: must not be called"
+    assert run._fastest(Contestant("large", "peer", (large,)), inputs) == "needs 5.0 GB, more than 4"
+    chosen = run._fastest(Contestant("mostly", "peer", (broken, small)), inputs)
+    assert isinstance(chosen, Way) and chosen.run is small.run and chosen.how == "small; fastest of 1 ways"
 
 
 def test_pinning_is_undone() -> None:

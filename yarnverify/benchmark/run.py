@@ -14,7 +14,7 @@ import numpy as np
 from yarnverify.benchmark.contestants import Contestant, contestants, failure, variants
 from yarnverify.benchmark.inputs import STATES, Inputs, timed_states
 from yarnverify.benchmark.peers import PEERS
-from yarnverify.benchmark.timing import Spread, paired, speedups, spread
+from yarnverify.benchmark.timing import Spread, paired, speedups, spread, warm
 from yarnverify.benchmark.ways import Way, degrees_of_freedom, outputs_bytes
 from yarnverify.errors import InputError
 from yarnverify.library import derivations
@@ -211,25 +211,23 @@ def _measure(
 def _fastest(contestant: Contestant, inputs: Inputs) -> Way | str:
     """The way with the least median time, or why there is none."""
     n = inputs.q.shape[1]
-    calls, ways, reason = {}, {}, ""
-    for way in contestant.ways:
-        try:
-            if way.bytes_at(n) > MOST_BYTES:
-                reason = reason or _too_large(way.bytes_at(n))
-                continue
-            way.run(inputs.q, inputs.parameters)
-        except Exception as error:  # a peer's own failure is its result here
-            reason = failure(error)
-            continue
-        ways[way.how] = way
-        calls[way.how] = _call(way, inputs)
-    if not ways:
+    calls, reason = {}, ""
+    ways = {way.how: way for way in contestant.ways}
+    for how, way in ways.items():
+        if way.bytes_at(n) > MOST_BYTES:
+            reason = _too_large(way.bytes_at(n))
+        else:
+            calls[how] = _call(way, inputs)
+    for how, error in warm(calls).items():
+        reason = failure(error)
+        del calls[how]
+    if not calls:
         return reason
-    if len(ways) == 1:
-        return next(iter(ways.values()))
+    if len(contestant.ways) == 1:
+        return contestant.ways[0]
     times = paired(calls, 3)
     best = min(times, key=lambda how: spread(times[how]).median)
-    return replace(ways[best], how=f"{best}; fastest of {len(ways)} ways")
+    return replace(ways[best], how=f"{best}; fastest of {len(calls)} ways")
 
 
 def _too_large(needed: int) -> str:
@@ -253,6 +251,9 @@ def _timed(ways: dict[str, Way], inputs: Inputs, rounds: int) -> dict[str, Any]:
             calls[name] = _call(way, inputs)
     calls[FLOOR] = _floor(n * outputs_bytes(inputs.q.shape[0]))
     with np.errstate(all="ignore"):
+        for name, error in warm(calls).items():
+            left_out[name] = failure(error)
+            del calls[name]
         times = paired(calls, rounds)
     scale = 1e9 / n
     return {

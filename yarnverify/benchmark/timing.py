@@ -32,6 +32,17 @@ def spread(values: Sequence[float]) -> Spread:
     return Spread(median(values), min(values), max(values))
 
 
+def warm(calls: Mapping[str, Call]) -> dict[str, Exception]:
+    """Call everybody once, so that compilers and caches are done; gives those that fail, and how."""
+    failed = {}
+    for name, call in calls.items():
+        try:
+            call()
+        except Exception as error:  # a contestant's own failure is its result
+            failed[name] = error
+    return failed
+
+
 def paired(
     calls: Mapping[str, Call], rounds: int, clock: Clock = perf_counter, least: float = LEAST_SECONDS
 ) -> dict[str, list[float]]:
@@ -40,7 +51,7 @@ def paired(
     Parameters
     ----------
     calls
-        Contestants; each is called once before anything is measured, and once more to find out how often to repeat.
+        Contestants, warm already (see ``warm``); each is called once more to find out how often to repeat.
     rounds
         How often all are measured; who goes first changes from round to round.
     clock
@@ -51,7 +62,6 @@ def paired(
     names = list(calls)
     repeats = {}
     for name in names:
-        calls[name]()
         once = _timed(calls[name], 1, clock)
         repeats[name] = max(1, math.ceil(least / max(once, least / 1000)))
     times: dict[str, list[float]] = {name: [] for name in names}
