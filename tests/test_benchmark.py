@@ -6,6 +6,7 @@ import builtins
 import importlib
 import json
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -330,15 +331,18 @@ def test_what_fails_or_needs_too_much_memory_is_left_out_and_said() -> None:
     large = Way("large", "packed", "component-first", never, lambda n: 10**9 * n)
     inputs = run.Inputs(np.zeros((2, 5)), ())
     broken = Way("broken", "packed", "component-first", never, lambda n: n)
-    entry = run._timed({"small": small, "large": large, "broken": broken}, inputs, 1)
+    entry = run._timed({"small": small, "large": large, "broken": broken}, inputs, 1, time.process_time)
     assert set(entry["ns"]) == {"small", run.FLOOR}
     assert entry["not_run"] == {
         "large": "needs 5.0 GB, more than 4",
         "broken": "AssertionError: must not be called",
     }
-    assert run._fastest(Contestant("both", "peer", (large, broken)), inputs) == "AssertionError: must not be called"
-    assert run._fastest(Contestant("large", "peer", (large,)), inputs) == "needs 5.0 GB, more than 4"
-    chosen = run._fastest(Contestant("mostly", "peer", (broken, small)), inputs)
+    assert (
+        run._fastest(Contestant("both", "peer", (large, broken)), inputs, time.process_time)
+        == "AssertionError: must not be called"
+    )
+    assert run._fastest(Contestant("large", "peer", (large,)), inputs, time.process_time) == "needs 5.0 GB, more than 4"
+    chosen = run._fastest(Contestant("mostly", "peer", (broken, small)), inputs, time.process_time)
     assert isinstance(chosen, Way) and chosen.run is small.run and chosen.how == "small; fastest of 1 ways"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -14,7 +15,7 @@ import numpy as np
 from yarnverify.benchmark.contestants import Contestant, contestants, failure, variants
 from yarnverify.benchmark.inputs import STATES, Inputs, timed_states
 from yarnverify.benchmark.peers import PEERS
-from yarnverify.benchmark.timing import Spread, paired, speedups, spread, warm
+from yarnverify.benchmark.timing import Clock, Spread, paired, speedups, spread, warm
 from yarnverify.benchmark.ways import Way, degrees_of_freedom, outputs_bytes
 from yarnverify.errors import InputError
 from yarnverify.library import derivations
@@ -74,15 +75,20 @@ def benchmark(
         raise InputError(f"{energy}: no such energy; there are {', '.join(each.name for each in declared)}")
     _check(sizes, peers, threads, rounds)
     sizes = sorted(set(sizes))
+    # one thread waits for nobody, so that its processor time is its wall time less what other programs took
+    clock = time.process_time if threads == 1 else time.perf_counter
     steps = len(chosen) * (len(variants()) + len(peers) + len(STATES) * len(sizes) + 1)
     with pinned(threads) as processors:
-        found = {each.name: _measure(each, sizes, peers, threads, rounds, points, advance, steps) for each in chosen}
+        found = {
+            each.name: _measure(each, sizes, peers, threads, rounds, points, clock, advance, steps) for each in chosen
+        }
     packages = sorted({package for each in found.values() for package in each.pop("packages")})
     return {
         "schema": 1,
         "command": _command(energy, sizes, peers, threads, rounds),
         "environment": environment(packages, processors),
         "threads": threads,
+        "clock": "wall time" if clock is time.perf_counter else "processor time",
         "rounds": rounds,
         "energies": found,
     }
@@ -161,6 +167,7 @@ def _measure(
     threads: int,
     rounds: int,
     points: int,
+    clock: Clock,
     advance: Advance,
     steps: int,
 ) -> dict[str, Any]:
@@ -172,7 +179,7 @@ def _measure(
     for name, reason in missing.items():
         advance(f"{energy.name}: {name} not run: {reason}", steps)
     for contestant in able:
-        way = _fastest(contestant, tuned)
+        way = _fastest(contestant, tuned, clock)
         advance(f"{energy.name}: {contestant.name} prepared", steps)
         if isinstance(way, str):
             missing[contestant.name] = way
@@ -184,7 +191,7 @@ def _measure(
         states[state] = []
         for n in sizes:
             few = min(rounds, LONG_ROUNDS) if n >= LONG else rounds
-            states[state].append(_timed(chosen, inputs.first(n), few))
+            states[state].append(_timed(chosen, inputs.first(n), few, clock))
             advance(f"{energy.name}: {n} elements, {state}", steps)
     errors = errors_of(energy, chosen, points)
     advance(f"{energy.name}: errors", steps)
@@ -208,7 +215,7 @@ def _measure(
     }
 
 
-def _fastest(contestant: Contestant, inputs: Inputs) -> Way | str:
+def _fastest(contestant: Contestant, inputs: Inputs, clock: Clock) -> Way | str:
     """The way with the least median time, or why there is none."""
     n = inputs.q.shape[1]
     calls, reason = {}, ""
@@ -225,7 +232,7 @@ def _fastest(contestant: Contestant, inputs: Inputs) -> Way | str:
         return reason
     if len(contestant.ways) == 1:
         return contestant.ways[0]
-    times = paired(calls, 3)
+    times = paired(calls, 3, clock)
     best = min(times, key=lambda how: spread(times[how]).median)
     return replace(ways[best], how=f"{best}; fastest of {len(calls)} ways")
 
@@ -238,7 +245,7 @@ def _call(way: Way, inputs: Inputs) -> Callable[[], object]:
     return lambda: way.run(inputs.q, inputs.parameters)
 
 
-def _timed(ways: dict[str, Way], inputs: Inputs, rounds: int) -> dict[str, Any]:
+def _timed(ways: dict[str, Way], inputs: Inputs, rounds: int, clock: Clock) -> dict[str, Any]:
     """Times at one batch size, in nanoseconds per element, and how many times as fast as each baseline."""
     n = inputs.q.shape[1]
     left_out: dict[str, str] = {}
@@ -254,7 +261,7 @@ def _timed(ways: dict[str, Way], inputs: Inputs, rounds: int) -> dict[str, Any]:
         for name, error in warm(calls).items():
             left_out[name] = failure(error)
             del calls[name]
-        times = paired(calls, rounds)
+        times = paired(calls, rounds, clock)
     scale = 1e9 / n
     return {
         "n": n,

@@ -20,7 +20,7 @@ def show_benchmark(record: dict[str, Any]) -> None:
             for note in table.notes:
                 print(note)
             print()
-    print(f"Measured on {where(record)}; shown, and compared with nothing.")
+    print(f"Measured in {record['clock']} on {where(record)}; shown, and compared with nothing.")
     print(f"Command: {record['command']}")
 
 

@@ -153,7 +153,7 @@ def _names_at_the_end(axes: Axes, curve: dict[str, Any], output: str, names: Seq
     edge = axes.get_xlim()[1]
     for (name, end), place in zip(ends.items(), places, strict=True):
         axes.annotate(
-            name, (edge, 10**end), xytext=(edge / 60, 10**place), color=mark(name, names).colour, va="center",
+            name, (edge, 10**end), xytext=(edge / 60, 10**place), color="0.1", va="center",
             ha="left", fontsize=7.5, annotation_clip=False,
             arrowprops={"arrowstyle": "-", "color": mark(name, names).colour, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 0},
         )  # fmt: skip
@@ -209,6 +209,9 @@ def _scatter(
 ) -> None:
     names = list(times)
     spots = {name: (times[name][0], _height(errors[name])) for name in names}
+    for band in (_WRONG, _NOTHING):  # heights in a band mean nothing; neighbours take different ones
+        inside = sorted((name for name in names if spots[name][1] == band), key=lambda name: times[name])
+        spots |= {name: (times[name][0], band * 10.0 ** (0.75 * (1 - k % 3))) for k, name in enumerate(inside)}
     best = front({name: (times[name][0], math.inf if errors[name] == "inf" else float(errors[name])) for name in names})
     stairs = [spots[name] for name in best]
     corners = [(stairs[0][0], _EDGES[2])]
@@ -219,7 +222,7 @@ def _scatter(
     lines = [*pairwise(corners)]
     for name, (x, y) in spots.items():
         style = mark(name, names)
-        axes.plot(times[name][1:], [y, y], color=style.colour, linewidth=0.8, zorder=2)
+        axes.plot(times[name][1:], [y, y], color=style.colour, linewidth=0.8, alpha=0.5, zorder=2)
         lines.append(((times[name][1], y), (times[name][2], y)))
         axes.plot(
             x, y, marker=style.marker, color=style.colour, markersize=7, linestyle="none", zorder=3,
@@ -265,7 +268,7 @@ def _names_beside(
         lead = {"arrowstyle": "-", "color": colour, "linewidth": 0.5, "shrinkA": 0, "shrinkB": 3}
         axes.annotate(
             name, spots[name], xytext=(a - x, b - y), textcoords="offset points", ha="center", va="center",
-            fontsize=7.5, color=colour, fontweight="bold" if name in best else "normal",
+            fontsize=7.5, color="0.1", fontweight="bold" if name in best else "normal",
             fontstyle="italic" if contestants[name]["kind"] == "peer" else "normal",
             arrowprops=lead if abs(b - y) > 12 else None,
         )  # fmt: skip
