@@ -12,7 +12,7 @@ from typing import Any
 import casadi
 import numpy as np
 
-from yarnverify.benchmark.peers.walk import Functions, energy_of
+from yarnverify.benchmark.peers.walk import FORMS, Functions, energy_of
 from yarnverify.benchmark.ways import Array, Outputs, Way, degrees_of_freedom, outputs_bytes, sizes
 from yarnverify.errors import NotRunError
 from yarnverify.symbolic.declare import Energy
@@ -48,7 +48,7 @@ void loop(long n, const double* q, const double* p, double* e, double* g, double
 
 
 def ways(energy: Energy) -> tuple[Way, ...]:
-    """The compiled loop.
+    """The compiled loop of each form of the energy.
 
     Raises
     ------
@@ -58,8 +58,12 @@ def ways(energy: Energy) -> tuple[Way, ...]:
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:
         raise NotRunError("no C compiler: install gcc")
+    return tuple(_way(energy, compiler, form) for form in FORMS)
+
+
+def _way(energy: Energy, compiler: str, form: str) -> Way:
     dof = degrees_of_freedom(energy)
-    loop = _compiled(compiler, _function(energy, dof), dof)
+    loop = _compiled(compiler, _function(energy, dof, form), dof)
 
     def run(q: Array, values: tuple[float, ...]) -> Outputs:
         n = q.shape[1]
@@ -68,14 +72,14 @@ def ways(energy: Energy) -> tuple[Way, ...]:
         loop(n, q.ctypes.data, p.ctypes.data, e.ctypes.data, g.ctypes.data, h.ctypes.data)
         return e, g, h
 
-    how = f"generated C, {' '.join(FLAGS)}, loop over elements"
-    return (Way(how, "packed", "element-first", run, lambda n: n * outputs_bytes(dof)),)
+    how = f"generated C, {' '.join(FLAGS)}, loop over elements, {form}"
+    return Way(how, "packed", "element-first", run, lambda n: n * outputs_bytes(dof))
 
 
-def _function(energy: Energy, dof: int) -> Any:
+def _function(energy: Energy, dof: int, form: str) -> Any:
     q, p = casadi.SX.sym("q", dof), casadi.SX.sym("p", len(energy.parameters))
-    rows = [q[i] for i in range(dof)]
-    value = energy_of(energy, rows, [p[i] for i in range(len(energy.parameters))], _FUNCTIONS)
+    parameters = [p[i] for i in range(len(energy.parameters))]
+    value = energy_of(energy, [q[i] for i in range(dof)], parameters, _FUNCTIONS, form)
     hessian, gradient = casadi.hessian(value, q)
     upper = casadi.vertcat(*(hessian[i, j] for i in range(dof) for j in range(i, dof)))
     dense = [casadi.densify(part) for part in (value, gradient, upper)]

@@ -8,6 +8,7 @@ import numpy as np
 import sympy as sp
 
 from yarnverify.benchmark.peers.symbols import energy_expression
+from yarnverify.benchmark.peers.walk import FORMS
 from yarnverify.benchmark.ways import Array, Outputs, Way, chunks, degrees_of_freedom, empty_outputs, outputs_bytes
 from yarnverify.symbolic.declare import Energy
 
@@ -20,7 +21,7 @@ FIRST, SECOND = 2.0**-18, 2.0**-13
 def ways(energy: Energy) -> tuple[Way, ...]:
     """One way for each size of chunk."""
     dof = degrees_of_freedom(energy)
-    rows, parameters, expression = energy_expression(energy)
+    rows, parameters, expression = energy_expression(energy, FORMS[1])
     function = sp.lambdify([*rows, *parameters], expression, modules="numpy", cse=True)
 
     def way(chunk: int) -> Way:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ os.environ.setdefault("JAX_PLATFORMS", "cpu")
 import jax
 import jax.numpy as jnp
 
-from yarnverify.benchmark.peers.walk import Functions, energy_of
+from yarnverify.benchmark.peers.walk import FORMS, Functions, energy_of
 from yarnverify.benchmark.ways import Array, Outputs, Way, chunks, degrees_of_freedom, outputs_bytes
 from yarnverify.symbolic.declare import Energy
 
@@ -35,6 +36,7 @@ _FUNCTIONS = Functions(
         "tan": jnp.tan,
     },
 )
+_ARRAYS = replace(_FUNCTIONS, arrays=jnp)
 _HESSIANS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("hessian", jax.hessian),
     ("jacfwd(jacfwd)", lambda f: jax.jacfwd(jax.jacfwd(f))),
@@ -43,18 +45,20 @@ _HESSIANS: tuple[tuple[str, Callable[..., Any]], ...] = (
 
 
 def ways(energy: Energy) -> tuple[Way, ...]:
-    """Three orders of differentiation, each on the whole batch and in chunks."""
+    """Three orders of differentiation, each on the whole batch and in chunks; and the energy as it is declared."""
     jax.config.update("jax_enable_x64", True)  # this process computes in double precision from here on
-    dof = degrees_of_freedom(energy)
+    dof, parameters = degrees_of_freedom(energy), len(energy.parameters)
 
-    def value(q: Any, values: Any) -> Any:
-        return energy_of(energy, list(q), list(values), _FUNCTIONS)
+    def value(functions: Functions, form: str) -> Callable[[Any, Any], Any]:
+        return lambda q, values: energy_of(energy, q, values, functions, form)
 
     found = []
-    for name, hessian in _HESSIANS:
-        function = jax.jit(jax.vmap(_all(value, hessian(value)), in_axes=(1, None)))
-        for chunk in (None, CHUNK):
-            found.append(_way(name, function, chunk, dof, len(energy.parameters)))
+    for form, functions, hessians in ((FORMS[1], _ARRAYS, _HESSIANS), (FORMS[0], _FUNCTIONS, _HESSIANS[:1])):
+        for name, hessian in hessians:
+            own = value(functions, form)
+            function = jax.jit(jax.vmap(_all(own, hessian(own)), in_axes=(1, None)))
+            for chunk in (None, CHUNK):
+                found.append(_way(f"jit(vmap({name})), {form}", function, chunk, dof, parameters))
     return tuple(found)
 
 
@@ -85,5 +89,5 @@ def _way(name: str, function: Any, chunk: int | None, dof: int, parameters: int)
         own = int(analysis.temp_size_in_bytes) + int(analysis.output_size_in_bytes)
         return own + n * outputs_bytes(dof, packed=False)
 
-    how = f"jit(vmap({name})), {f'chunks of {chunk}' if chunk else 'whole batch'}"
+    how = f"{name}, {f'chunks of {chunk}' if chunk else 'whole batch'}"
     return Way(how, "full", "element-first", run, bytes_at)

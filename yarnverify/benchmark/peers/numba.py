@@ -11,6 +11,7 @@ import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
 from yarnverify.benchmark.peers.symbols import expressions
+from yarnverify.benchmark.peers.walk import FORMS
 from yarnverify.benchmark.ways import Array, Outputs, Way, degrees_of_freedom, outputs_bytes, sizes
 from yarnverify.symbolic.declare import Energy
 
@@ -18,10 +19,14 @@ PACKAGES = ("numba",)
 
 
 def ways(energy: Energy) -> tuple[Way, ...]:
-    """The compiled loop; element-first outputs are the faster ones for it."""
+    """The compiled loop of each form of the energy; element-first outputs are the faster ones for it."""
+    return tuple(_way(energy, form) for form in FORMS)
+
+
+def _way(energy: Energy, form: str) -> Way:
     dof = degrees_of_freedom(energy)
     namespace: dict[str, Any] = {"math": math}
-    exec(_source(energy), namespace)
+    exec(_source(energy, form), namespace)
     loop = numba.njit(namespace["loop"], error_model="numpy")
 
     def run(q: Array, values: tuple[float, ...]) -> Outputs:
@@ -30,12 +35,12 @@ def ways(energy: Energy) -> tuple[Way, ...]:
         loop(q, np.array(values), *out)
         return out
 
-    how = "njit of SymPy's cse, loop over elements"
-    return (Way(how, "packed", "element-first", run, lambda n: n * outputs_bytes(dof)),)
+    how = f"njit of SymPy's cse, loop over elements, {form}"
+    return Way(how, "packed", "element-first", run, lambda n: n * outputs_bytes(dof))
 
 
-def _source(energy: Energy) -> str:
-    rows, parameters, outputs = expressions(energy)
+def _source(energy: Energy, form: str) -> str:
+    rows, parameters, outputs = expressions(energy, form)
     dof = len(rows)
     shared, reduced = sp.cse(outputs, list=False)
     printer = PythonCodePrinter({"fully_qualified_modules": True})

@@ -19,21 +19,21 @@ _FUNCTIONS = Functions(
 )
 
 
-def expressions(energy: Energy) -> tuple[list[Any], list[Any], list[Any]]:
-    """Symbols of the rows of q, symbols of the parameters, and all outputs one after the other."""
-    rows, parameters, value = energy_expression(energy)
+def expressions(energy: Energy, form: str) -> tuple[list[Any], list[Any], list[Any]]:
+    """Symbols of the rows of q, symbols of the parameters, and all outputs one after the other; for ``form`` see ``walk``."""
+    rows, parameters, value = energy_expression(energy, form)
     dof = len(rows)
     gradient = [sp.diff(value, row) for row in rows]
     hessian = [_regular(sp.diff(gradient[i], rows[j])) for i in range(dof) for j in range(i, dof)]
     return rows, parameters, [value, *gradient, *hessian]
 
 
-def energy_expression(energy: Energy) -> tuple[list[Any], list[Any], Any]:
+def energy_expression(energy: Energy, form: str) -> tuple[list[Any], list[Any], Any]:
     """The same of the energy alone."""
     dof = degrees_of_freedom(energy)
     rows = list(sp.symbols(f"q:{dof}", real=True))
     parameters = list(sp.symbols(f"p:{len(energy.parameters)}", real=True))
-    return rows, parameters, energy_of(energy, rows, parameters, _FUNCTIONS)
+    return rows, parameters, energy_of(energy, rows, parameters, _FUNCTIONS, form)
 
 
 def _regular(value: Any) -> Any:
