@@ -21,6 +21,7 @@ from yarnverify.accuracy.regimes import curve_points, points_of, regimes
 from yarnverify.accuracy.shape import shape_of
 from yarnverify.accuracy.truth import Points, Truth, truth
 from yarnverify.errors import InputError
+from yarnverify.library import derivations
 from yarnverify.symbolic.declare import Energy, load_declarations
 
 Array = NDArray[Any]
@@ -43,7 +44,7 @@ class Unit:
     everywhere
         Whether the condition of every Hessian is worked out, rather than where a loss must be explained.
     derivations
-        Folder of declared energies.
+        Folder of declared energies; empty for those of the package, wherever the worker has it.
     kind
         "cells", or "curve": error against the distance from what is hard.
     """
@@ -176,7 +177,8 @@ def _share(target: str, output: str, errors: Errors, conditions: _Conditions) ->
         share = math.inf
         for draws in (1, 0):  # a bound from below is cheaper, and often enough
             amplification = np.nan_to_num(conditions.at(output, int(point), draws if output == "H" else 0), nan=0.0)
-            share = float((column / (EXACT + AMPLIFIED * amplification)).max())
+            with np.errstate(over="ignore"):  # an infinite condition allows any finite error
+                share = float(np.where(np.isinf(column), np.inf, column / (EXACT + AMPLIFIED * amplification)).max())
             if share <= 1 or output != "H":
                 break
         if share > worst:
@@ -192,7 +194,7 @@ def run_unit(unit: Unit) -> dict[str, Any]:
     InputError
         For an energy, a regime or a kernel that is not there.
     """
-    energy = declared_energy(unit.energy, unit.derivations)
+    energy = declared_energy(unit.energy, unit.derivations or derivations())
     if unit.kind == "curve":
         return {"curve": _curve(energy, unit)}
     regime = next((regime for regime in regimes(energy) if regime.name == unit.regime), None)
@@ -304,7 +306,7 @@ def _summary(
     ordered = np.sort(known)
     found = {
         "worst": significant(float(worst[at])),
-        "p99": significant(float(ordered[math.ceil(0.99 * (ordered.size - 1))])),
+        "p99": significant(float(ordered[math.ceil(0.99 * ordered.size) - 1])),
         "median": significant(float(ordered[(ordered.size - 1) // 2])),
         "componentwise": significant(float(np.nanmax(errors.worst_component))),
         **counts,

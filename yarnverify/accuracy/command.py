@@ -28,8 +28,12 @@ def sweep(
     if not units:
         raise NotRunError(f"no kernels to measure: {'; '.join(missing)}")
     folder = state or state_folder(units)
-    with executor_named(executor, jobs) as pool:
-        results = run(units, pool, folder, advance)
+    try:
+        with executor_named(executor, jobs) as pool:
+            results = run(units, pool, folder, advance)
+    except KeyboardInterrupt:
+        kept = len(list(folder.glob("*.json")))
+        raise NotRunError(f"interrupted; {kept} of {len(units)} parts are kept, and the same command goes on") from None
     finish(folder)
     return make_record(PROFILES[profile], units, results, missing)
 

@@ -3,10 +3,12 @@
     error = |computed - true| / (u max(|true|, smallest normal number))
 
 normwise (2-norm) over a block, three rows of a gradient that belong to a point or one that belongs to a sliding coordinate,
-and likewise for the Hessian; or for each component alone. Since a number below the smallest normal one is held to within half
+and likewise for the Hessian; or for each component alone, where one below u times its block is held to u times its block: further
+down a sum in twice the digits has none left. Since a number below the smallest normal one is held to within half
 the smallest subnormal, which is u times the smallest normal, one unit is always one unit of what the format can hold, and
 a true zero asks for a zero. A result that is not finite where the truth fits the format is an infinite error. Where the truth
-does not fit, the block has no error: NaN here, counted as overflow or as without a value.
+does not fit, the block has no error, nor has any block of an element that was refused for that: NaN here, counted as overflow or
+as without a value.
 
 Differences are taken to the true value, not to the nearest double: an error of a hundredth of a unit is seen.
 """
@@ -129,6 +131,9 @@ def measure(output: str, computed: Array, truth: Truth, unknowns: Sequence[Name]
     present = truth.has_energy if output == "E" else truth.has_derivatives
     too_large = float(limits.max) * (1 + unit / 2)  # rounds to infinity
     fits = np.abs(high) < too_large
+    flat_computed = computed.reshape(-1, n)
+    # an element of which something overflows may be refused as a whole
+    refused = ~fits.reshape(-1, n).all(axis=0) & np.isnan(flat_computed).all(axis=0)
     every = [
         (label, high[place], low[place], computed[place], fits[place]) for label, place in blocks_of(output, unknowns)
     ]
@@ -140,9 +145,10 @@ def measure(output: str, computed: Array, truth: Truth, unknowns: Sequence[Name]
             fit = np.all(fit.reshape(-1, n), axis=0)
             difference = (flat[2] - flat[0]) - flat[1]
             broken = ~np.isfinite(flat[2]).all(axis=0)
-            each = (np.abs(difference) / np.maximum(np.abs(flat[0]), tiny) / unit).max(axis=0)
+            floor = np.maximum(unit * norm(flat[0]), tiny)
+            each = (np.abs(difference) / np.maximum(np.abs(flat[0]), floor) / unit).max(axis=0)
             whole = norm(difference) / np.maximum(norm(flat[0]), tiny) / unit
-            known = present & fit
+            known = present & fit & ~refused
             normwise[at] = np.where(known, np.where(broken, np.inf, whole), np.nan)
             componentwise[at] = np.where(known, np.where(broken, np.inf, each), np.nan)
             nan |= known & np.isnan(flat[2]).any(axis=0)

@@ -36,7 +36,15 @@ def make_record(
 
 
 def record_text(record: dict[str, Any]) -> str:
-    return json.dumps(record, indent=1, ensure_ascii=False) + "\n"
+    """JSON with a line for each cell and curve, so that a change of one shows as one line."""
+    parts = []
+    for key, value in record.items():
+        if key in ("cells", "curves") and value:
+            lines = ",\n  ".join(json.dumps(entry, ensure_ascii=False) for entry in value)
+            parts.append(f"{json.dumps(key)}: [\n  {lines}\n ]")
+        else:
+            parts.append(f"{json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}")
+    return "{\n " + ",\n ".join(parts) + "\n}\n"
 
 
 def read_record(path: Path) -> dict[str, Any]:

@@ -107,6 +107,6 @@ def replay_lines(found: dict[str, Any]) -> list[str]:
         at = off.index(max(off))
         lines.append(
             f"  {row['output'] + ' ' + row['block']:<10}{row['computed'][at]:< 26.17g}{row['true'][at]:< 26.17g}"
-            f"{row['error']!s:<12}{row['componentwise']!s:<14}{row['condition']!s:<12}{row['label']}"
+            f"{float(row['error']):<12.3g}{float(row['componentwise']):<14.3g}{float(row['condition']):<12.3g}{row['label']}"
         )
     return lines

@@ -7,6 +7,7 @@ import json
 import multiprocessing
 import os
 import re
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -35,7 +36,7 @@ class Profile:
     everywhere: bool
 
 
-PROFILES = {"quick": Profile("quick", 100, 6, False), "full": Profile("full", 4000, 24, True)}
+PROFILES = {"quick": Profile("quick", 100, 6, False), "full": Profile("full", 2000, 24, True)}
 
 
 def plan(
@@ -63,6 +64,7 @@ def plan(
     InputError
         For a name that is not there.
     """
+    where = "" if folder is None else str(folder)
     folder = folder or derivations()
     names = [energy.name for energy in load_declarations(folder).energies if energy.document == MAIN_DOCUMENT]
     for name in energies:
@@ -85,10 +87,10 @@ def plan(
             if not able:
                 continue
             for regime in regimes(energy):
-                units.append(Unit(name, dtype, regime.name, able, profile.count, seed, profile.everywhere, str(folder)))
+                units.append(Unit(name, dtype, regime.name, able, profile.count, seed, profile.everywhere, where))
         for towards in curves(energy):
             units.append(
-                Unit(name, "float64", towards, tuple(there), profile.orientations, seed, False, str(folder), "curve")
+                Unit(name, "float64", towards, tuple(there), profile.orientations, seed, False, where, "curve")
             )
     return units, missing
 
@@ -108,7 +110,9 @@ def executor_named(text: str, jobs: int | None = None) -> Iterator[Executor | No
         yield None
     elif text == "processes":
         # started afresh, not forked: a fork copies the threads of a progress bar half-way
-        with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+        fresh = multiprocessing.get_context("spawn")
+        ignored = (signal.SIGINT, signal.SIG_IGN)  # an interruption is the parent's to handle
+        with ProcessPoolExecutor(jobs, fresh, signal.signal, ignored) as pool:
             yield pool
     elif text.startswith("dask:") and len(text) > len("dask:"):
         try:
@@ -182,7 +186,7 @@ def state_folder(units: Sequence[Unit]) -> Path:
     """Where a sweep keeps what is done: another place for another plan, other kernels, other code or other libraries."""
     package = Path(__file__).parent.parent
     code = sorted([*(package / "kernels").rglob("*.py"), *(package / "accuracy").glob("*.py")])
-    declared = sorted(Path(units[0].derivations).glob("*.py")) if units else []
+    declared = sorted(Path(units[0].derivations or derivations()).glob("*.py"))
     plan_text = json.dumps([asdict(unit) for unit in units]) + importlib.metadata.version("numpy")
     return cache_folder() / f"accuracy-{fingerprint([plan_text.encode(), *code, *declared])[:24]}"
 

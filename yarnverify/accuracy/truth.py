@@ -4,8 +4,8 @@ Shares no code with the SymPy derivation or with the kernels: the declared energ
 (``yarnverify.symbolic.forward``), which enclose the true values whatever the precision.
 
 Where a state has no value, no precision helps. The largest precision tried is a proof for energies of lengths and angles:
-a difference of doubles that is not zero exceeds 2^-1075 and lengths stay below 2^1026, so that 1 - cos^2 of an angle is
-zero or above 2^-9000.
+a difference of doubles that is not zero exceeds 2^-1075 and lengths stay below 2^1026, so that the squared sine of an angle
+between them is zero or above 2^-8500.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ from yarnverify.symbolic.numbers import Balls, UndefinedError
 from yarnverify.symbolic.tree import Name
 
 Array = NDArray[Any]
-BITS = (256, 512, 1024, 2048, 4096, 8192, 16384, 32768)
+BITS = (256, 512, 1536, 4096, 16384)  # a true zero is settled by 1536, being below 2^-1200
+_TIE = 1500  # bits that agree with a point halfway between two doubles
 _SPARE = 70  # bits of a value that must be known, so that an error of a thousandth of a rounding is seen
 _SMALLEST = 2.0**-1022
 PRECISION = threading.RLock()  # FLINT's working precision is one for all threads
@@ -70,8 +71,8 @@ class Truth:
         (n,), (dof, n), (dof, dof, n): rounded to nearest; infinite where the double overflows, NaN where there is no value.
     energy_low, gradient_low, hessian_low
         What the true value exceeds the double by, itself rounded.
-    energy_slopes, gradient_slopes
-        Derivatives by all inputs, rows of ``q`` and then parameters: (m, n) and (dof, m, n), in double precision.
+    energy_moves, gradient_moves
+        Derivatives by all inputs times the inputs, rows of ``q`` and then parameters: (m, n) and (dof, m, n), in double precision.
     has_energy, has_derivatives
         (n,) bool; an exact fold has an energy and no gradient.
     flushed
@@ -86,8 +87,8 @@ class Truth:
     energy_low: Array
     gradient_low: Array
     hessian_low: Array
-    energy_slopes: Array
-    gradient_slopes: Array
+    energy_moves: Array
+    gradient_moves: Array
     has_energy: Array
     has_derivatives: Array
     flushed: Array
@@ -118,7 +119,7 @@ def truth(energy: Energy, points: Points) -> Truth:
         raise InputError(f"{energy.name}: state {at}: {labels[row]} is {rows[row, at]}; give finite values")
     n = len(points)
     reduced = reduce(energy)
-    raw = _Raw(reduced, n)
+    raw = _Raw(reduced, points.q.shape[0], len(labels), n)
     with PRECISION:
         for at in range(n):
             _settle_state(reduced, [float(value) for value in rows[:, at]], at, raw)
@@ -128,7 +129,7 @@ def truth(energy: Energy, points: Points) -> Truth:
 class _Raw:
     """Results by forms, as they come: highs and lows of the energy, of the gradient's sums, of the Hessian's sums."""
 
-    def __init__(self, reduced: Reduced, n: int) -> None:
+    def __init__(self, reduced: Reduced, dof: int, inputs: int, n: int) -> None:
         self.sums = (reduced.gradient, reduced.hessian)
         self.counts = (1, len(reduced.gradient.terms), len(reduced.hessian.terms))
         total = sum(self.counts)
@@ -137,14 +138,22 @@ class _Raw:
             np.zeros((total, n)),
             np.zeros((total, n), bool),
         )
+        self.energy_moves, self.gradient_moves = np.zeros((inputs, n)), np.zeros((dof, inputs, n))
         self.has_energy, self.has_derivatives, self.bits = np.zeros(n, bool), np.zeros(n, bool), np.zeros(n, int)
+
+    def keep_moves(self, balls: Sequence[Any], values: Sequence[float], at: int) -> None:
+        """Products of derivatives and inputs: as balls, since a derivative may underflow where the product does not."""
+        (g, h), dof = self.sums, self.gradient_moves.shape[0]
+        first, second = balls[1 : 1 + self.counts[1]], balls[1 + self.counts[1] :]
+        for j, value in enumerate(values):
+            self.energy_moves[j, at] = float(first[g.index[j]] * value) * g.sign[j]
+            for i in range(dof):
+                self.gradient_moves[i, j, at] = float(second[h.index[i, j]] * value) * h.sign[i, j]
 
     def truth(self, dof: int) -> Truth:
         cuts = np.cumsum(self.counts)[:-1]
         highs, lows, lost = (np.split(array, cuts) for array in (self.high, self.low, self.flushed))
         g, h = self.sums
-        slopes = np.where(self.has_derivatives, highs[1][g.index] * g.sign[:, None], 0.0)
-        bends = np.where(self.has_derivatives, highs[2][h.index] * h.sign[:, :, None], 0.0)
         sign = h.sign[:dof, :dof, None]
         return Truth(
             energy=highs[0][0],
@@ -153,8 +162,8 @@ class _Raw:
             energy_low=lows[0][0],
             gradient_low=(lows[1][g.index] * g.sign[:, None])[:dof],
             hessian_low=lows[2][h.index[:dof, :dof]] * sign,
-            energy_slopes=slopes,
-            gradient_slopes=bends[:dof],
+            energy_moves=self.energy_moves,
+            gradient_moves=self.gradient_moves,
             has_energy=self.has_energy,
             has_derivatives=self.has_derivatives,
             flushed=np.array([lost[0][0], lost[1][g.index[:dof]].any(axis=0), lost[2][h.index[:dof]].any(axis=(0, 1))]),
@@ -176,6 +185,8 @@ def _settle_state(reduced: Reduced, values: Sequence[float], at: int, raw: _Raw)
         with flint.ctx.workprec(bits):
             rounded = [rounded_ball(ball) for ball in found]
         if None not in rounded:
+            with flint.ctx.workprec(64):
+                raw.keep_moves(found, values, at)
             raw.high[:, at], raw.low[:, at], raw.flushed[:, at] = zip(*rounded, strict=True)
             raw.has_energy[at] = raw.has_derivatives[at] = True
             raw.bits[at] = bits
@@ -248,8 +259,10 @@ def energy_alone(reduced: Reduced, values: Sequence[Any], bits: int) -> Any:
 def rounded_ball(ball: Any) -> tuple[float, float, bool] | None:
     """The nearest double, what is left, and whether a value that is not zero became zero; None if the ball is too wide."""
     high = float(ball.lower())
-    if high != float(ball.upper()):
-        return None  # also for a ball that is not finite
+    if high != float(ball.upper()):  # also for a ball that is not finite
+        if ball.rel_accuracy_bits() < _TIE:
+            return None
+        high = float(ball.mid())  # halfway between two doubles, for all that can be known: either will do
     if high == 0.0:
         return 0.0, 0.0, not ball.contains(0)
     if abs(high) == np.inf:

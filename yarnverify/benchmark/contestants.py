@@ -6,7 +6,6 @@ Whoever cannot run is named with the reason; nobody is left out silently.
 from __future__ import annotations
 
 import importlib
-import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,10 @@ from typing import Any
 from yarnverify.benchmark.peers import PEERS
 from yarnverify.benchmark.ways import Array, Outputs, Way, degrees_of_freedom, outputs_bytes
 from yarnverify.errors import NotRunError
+from yarnverify.kernels import VARIANTS
 from yarnverify.symbolic.declare import Energy
+
+COMPILED = ("accurate", "fast")
 
 
 @dataclass(frozen=True)
@@ -39,11 +41,11 @@ def contestants(
     peers
         Names out of ``PEERS``.
     threads
-        For kernels that take a number of threads; the others run on one.
+        For the kernels; the others run on one.
     """
     found: list[Contestant] = []
     missing: dict[str, str] = {}
-    for name in (*variants(), *peers):
+    for name in (*kernels(), *peers):
         try:
             found.append(_peer(energy, name) if name in peers else _kernel(energy, name, threads))
         except ImportError as error:
@@ -55,10 +57,9 @@ def contestants(
     return found, missing
 
 
-def variants() -> tuple[str, ...]:
-    """The kernels' variants."""
-    kernels = importlib.import_module("yarnverify.kernels")
-    return tuple(getattr(kernels, "VARIANTS", ("printed", "differentiated")))
+def kernels() -> tuple[str, ...]:
+    """The kernels' variants, each in NumPy, and those that one would use for speed also compiled."""
+    return *VARIANTS, *(f"{variant} compiled" for variant in COMPILED)
 
 
 def failure(error: BaseException) -> str:
@@ -67,7 +68,8 @@ def failure(error: BaseException) -> str:
     return f"{type(error).__name__}: {text[:200]}" if text else type(error).__name__
 
 
-def _kernel(energy: Energy, variant: str, threads: int) -> Contestant:
+def _kernel(energy: Energy, name: str, threads: int) -> Contestant:
+    variant, _, engine = name.partition(" ")
     place = f"yarnverify.kernels.{variant}.{energy.name}"
     try:
         module: Any = importlib.import_module(place)
@@ -75,20 +77,19 @@ def _kernel(energy: Energy, variant: str, threads: int) -> Contestant:
         if error.name and place.startswith(error.name):
             raise NotRunError("has no kernel of this energy") from None
         raise
-    options: dict[str, Any] = {}
-    if threads > 1 and "threads" in inspect.signature(module.packed).parameters:
-        options["threads"] = threads
+    if engine:
+        importlib.import_module("numba")
+    options: dict[str, Any] = {"threads": threads, "engine": engine or "numpy"}
     dof = degrees_of_freedom(energy)
 
     def run(q: Array, values: tuple[float, ...]) -> Outputs:
-        outputs: Outputs = module.packed(
-            q, **dict(zip(module.PARAMETERS, values, strict=True)), errors="mask", **options
-        )
+        named = dict(zip(module.PARAMETERS, values, strict=True))
+        outputs: Outputs = module.packed(q, **named, errors="mask", **options)
         return outputs
 
-    how = f"NumPy, {threads if options else 1} thread{'s' * bool(options)}"
+    how = f"{'compiled by numba' if engine else 'NumPy'}, {threads} thread{'s' * (threads > 1)}"
     way = Way(how, "packed", "component-first", run, lambda n: n * outputs_bytes(dof))
-    return Contestant(variant, "kernel", (way,))
+    return Contestant(name, "kernel", (way,), ("numba",) if engine else ())
 
 
 def _peer(energy: Energy, name: str) -> Contestant:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from yarnverify.benchmark.contestants import Contestant, contestants, failure, variants
+from yarnverify.benchmark.contestants import Contestant, contestants, failure, kernels
 from yarnverify.benchmark.inputs import STATES, Inputs, timed_states
 from yarnverify.benchmark.peers import PEERS
 from yarnverify.benchmark.timing import Clock, Spread, paired, speedups, spread, warm
@@ -51,7 +51,7 @@ def benchmark(
     peers
         Whom to measure beside the kernels.
     threads
-        For the kernels, if they take threads; the process is held to so many processors.
+        For the kernels; the process is held to so many processors.
     rounds
         Paired repetitions.
     advance
@@ -77,7 +77,7 @@ def benchmark(
     sizes = sorted(set(sizes))
     # one thread waits for nobody, so that its processor time is its wall time less what other programs took
     clock = time.process_time if threads == 1 else time.perf_counter
-    steps = len(chosen) * (len(variants()) + len(peers) + len(STATES) * len(sizes) + 1)
+    steps = len(chosen) * (len(kernels()) + len(peers) + len(STATES) * len(sizes) + 1)
     with pinned(threads) as processors:
         found = {
             each.name: _measure(each, sizes, peers, threads, rounds, points, clock, advance, steps) for each in chosen

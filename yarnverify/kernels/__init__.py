@@ -9,10 +9,14 @@
     bending.evaluate(q, k_b=...)            all three at once, sharing what they share
     bending.packed(q, k_b=...)              the same with the upper triangle only, for assembly
 
-Everything in this folder but this file and ``runtime.py`` is generated; every variant has the same interface.
+The default variant is ``accurate``; the packages ``yarnverify.kernels.fast`` and so on hold the others, all with the same
+interface. Generated modules hold straight-line formulas over ``geometry`` (safe atoms); ``runtime`` runs them by way of
+``tape`` (chunks of NumPy calls), ``doubledouble`` or ``compiled`` (numba).
 """
 
 from yarnverify.kernels import bending, parallel_contact, shear, stretch
 from yarnverify.kernels.runtime import ElementError
 
-__all__ = ["ElementError", "bending", "parallel_contact", "shear", "stretch"]
+VARIANTS = ("accurate", "fast", "reference", "differentiated", "printed")
+
+__all__ = ["VARIANTS", "ElementError", "bending", "parallel_contact", "shear", "stretch"]

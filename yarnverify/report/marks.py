@@ -25,13 +25,15 @@ _MARKS = {
     "reference": Mark("D", (0, (7, 1.5, 1.5, 1.5)), "#009E73"),
     "differentiated": Mark("^", (0, (1, 1.2)), "#D55E00"),
     "printed": Mark("v", (0, (3, 1, 1, 1, 1, 1)), "#CC79A7"),
+    "accurate compiled": Mark("*", "-", "#0072B2"),
+    "fast compiled": Mark("d", (0, (5, 1.5)), "#E69F00"),
     "lambdify": Mark("<", (0, (4, 3)), "#7F6000"),
     "jax": Mark("P", (0, (2, 2)), "#56B4E9"),
     "casadi": Mark("X", (0, (6, 3)), "#882255"),
     "numba": Mark("p", (0, (1, 2)), "#117733"),
     "differences": Mark("h", (0, (3, 3)), "#666666"),
 }
-_OTHERS = (Mark(">", "-", "#000000"), Mark("d", "--", "#444444"), Mark("8", ":", "#222222"), Mark("H", "-.", "#333333"))
+_OTHERS = (Mark(">", "-", "#000000"), Mark("1", "--", "#444444"), Mark("8", ":", "#222222"), Mark("H", "-.", "#333333"))
 
 
 def mark(name: str, names: Sequence[str]) -> Mark:

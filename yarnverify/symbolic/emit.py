@@ -1,16 +1,16 @@
-"""Reading 3: a program. Trees become straight-line NumPy code, the same text on every run.
+"""Reading 3: a program. Trees become straight-line code on scalars, the same text on every run.
 
-A ``Program`` is a list of named scalar steps; every output function keeps the steps that it needs. What is emitted is a
-matter of the formulas that are put in, not of this module: the derived blocks give the variant ``differentiated``, the
-document's own printed blocks the variant ``printed``.
+What is emitted is a matter of the formulas that are put in, not of this module: the derived blocks give the variant
+``differentiated``, the document's own printed blocks ``printed``, the rearranged blocks of ``safe`` all others. What a wanted
+output does not need is dropped when the code is recorded (``kernels.tape``), not here.
 """
 
 from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
@@ -40,6 +40,11 @@ def row_symbols(name: Name) -> list[sp.Symbol]:
     )
 
 
+def given_symbols(name: Name) -> list[sp.Symbol]:
+    """The scalars of an atom that a function of ``kernels.geometry`` provides: three for a vector."""
+    return [sp.Symbol(identifier(name) + part, real=True) for part in (("_x", "_y", "_z") if name.bold else ("",))]
+
+
 def dof_labels(unknowns: Iterable[Name]) -> tuple[str, ...]:
     """Names of the rows of ``q``, such as ``x0.x`` and ``u1``."""
     return tuple(label for n in unknowns for label in ([f"{n.label}.{axis}" for axis in AXES] if n.bold else [n.label]))
@@ -48,9 +53,16 @@ def dof_labels(unknowns: Iterable[Name]) -> tuple[str, ...]:
 class Components(Reading):
     """Values of trees as SymPy scalars over the rows of ``q``; definitions and shared scalars become named steps."""
 
-    def __init__(self, section: Section, formulas: Formulas, naming: bool = True, forces: bool = True) -> None:
+    def __init__(
+        self,
+        section: Section,
+        formulas: Formulas,
+        naming: bool = True,
+        forces: bool = True,
+        given: frozenset[Name] = frozenset(),
+    ) -> None:
         super().__init__(section)
-        self.formulas, self.naming, self.forces = formulas, naming, forces
+        self.formulas, self.naming, self.forces, self.given = formulas, naming, forces, given
         self.steps: dict[sp.Symbol, Any] = {}
         self._known: dict[Any, sp.Symbol] = {}
         self._blocks: dict[Expr, Value] = {}
@@ -61,6 +73,9 @@ class Components(Reading):
         return sp.Integer(value)
 
     def leaf(self, name: Name) -> Value:
+        if name in self.given:
+            found = given_symbols(name)
+            return found if name.bold else found[0]
         if self.section.is_unknown(name):
             symbols = row_symbols(name)
             return symbols if name.bold else symbols[0]
@@ -101,7 +116,7 @@ class Components(Reading):
 
     def symbol(self, name: Name) -> Value:
         if name not in self._values:
-            meaning = self.section.meaning(name)
+            meaning = None if name in self.given else self.section.meaning(name)
             self._values[name] = (
                 self.leaf(name) if meaning is None else self._named(self.value(meaning), identifier(name))
             )
@@ -116,16 +131,20 @@ class Components(Reading):
             label = block_of(expr).replace("/", "_")
             if not self.forces:  # the formulas are those of the gradient and the Hessian
                 label = label.replace("dF_", "h_").replace("_d", "_").replace("F_", "g_")
-            self._blocks[expr] = self._named(self.value(self.formulas[expr], self.block), label)
+            value = self.value(self.formulas[expr], self.block)
+            if expr.op == "derivative" and expr.args[0].name == expr.name and expr.name.bold:
+                value = [[value[min(i, j)][max(i, j)] for j in range(3)] for i in range(3)]  # symmetric: one triangle
+            self._blocks[expr] = self._named(value, label)
         return self._blocks[expr]
 
 
 @dataclass(frozen=True)
 class Program:
-    """Straight-line code for one energy: steps, and outputs over them.
+    """Straight-line code for one shape of one energy: steps, and outputs over them.
 
     ``hessian`` holds the upper triangle, row by row. ``checks`` are scalars that must be positive where derivatives
-    (or already the energy) are wanted, each with what it means when one is not.
+    (or already the energy) are wanted, each with what it means when one is not. ``choice`` is positive where this shape is
+    the right one; None where it always is. ``prologue`` are lines that come before the steps.
     """
 
     steps: Mapping[sp.Symbol, Any]
@@ -133,8 +152,15 @@ class Program:
     gradient: tuple[Any, ...]
     hessian: tuple[Any, ...]
     checks: tuple[tuple[Any, str, str], ...] = ()
-    active: Any = None
-    operations: Mapping[str, int] = field(default_factory=dict)
+    choice: Any = None
+    prologue: tuple[str, ...] = ()
+    name: str = "element"
+
+    @property
+    def outputs(self) -> list[Any]:
+        """Everything that is returned, in order."""
+        choice = [] if self.choice is None else [self.choice]
+        return [self.energy, *self.gradient, *self.hessian, *(check[0] for check in self.checks), *choice]
 
 
 def program(
@@ -159,6 +185,18 @@ def program(
         Where a block has no formula.
     """
     reading = Components(section, formulas, forces=scale == FORCE)
+    value, gradient, hessian = entries_of(energy, reading, tree, scale)
+    checks = list(length_checks(energy, section, reading, ", or so little that its square vanishes"))
+    checks += domain_checks(energy, reading)
+    for angle in angles:
+        sine, _ = reading.circle(reading.symbol(angle))
+        text = f"{angle} is 0 or pi within rounding, where this variant divides by its sine"
+        checks.append((sine, "derivatives", text))
+    return settled(reading.steps, value, gradient, hessian, checks, active(energy, reading))
+
+
+def entries_of(energy: Energy, reading: Components, tree: Expr, scale: int) -> tuple[Any, list[Any], list[Any]]:
+    """Energy, gradient and upper triangle of the Hessian, as scalars over the steps of a reading."""
     value = reading.value(tree)
     unknowns = energy.unknowns
     forces = {n: Expr("force", value=n) for n in unknowns}
@@ -169,13 +207,7 @@ def program(
         for column, b in offsets[i:]:
             entries = reading.block(Expr("derivative", (forces[row],), column))
             hessian.append(scale * _entry(entries, a, b, row.bold, column.bold))
-    checks = list(_checks(energy, section, reading))
-    for angle in angles:
-        sine, _ = reading.circle(reading.symbol(angle))
-        text = f"{angle} is 0 or pi within rounding, where this variant divides by its sine"
-        checks.append((sine, "derivatives", text))
-    active = _active(energy, reading)
-    return _settled(reading.steps, value, gradient, hessian, checks, active)
+    return value, gradient, hessian
 
 
 def plain_program(energy: Energy, section: Section) -> Program:
@@ -185,8 +217,9 @@ def plain_program(energy: Energy, section: Section) -> Program:
     rows = [symbol for n in energy.unknowns for symbol in row_symbols(n)]
     gradient = [sp.diff(value, row) for row in rows]
     hessian = [sp.diff(gradient[i], rows[j]) for i in range(len(rows)) for j in range(i, len(rows))]
-    checks = list(_checks(energy, section, reading))
-    return _settled({}, value, gradient, hessian, checks, _active(energy, reading))
+    checks = list(length_checks(energy, section, reading, ", or so little that its square vanishes"))
+    checks += domain_checks(energy, reading)
+    return settled({}, value, gradient, hessian, checks, active(energy, reading))
 
 
 def _rows(value: Value) -> list[Any]:
@@ -201,24 +234,32 @@ def _entry(value: Value, a: int, b: int, row: bool, column: bool) -> Any:
     return value
 
 
-def _checks(energy: Energy, section: Section, reading: Components) -> Iterable[tuple[Any, str, str]]:
-    """Lengths and the declared domain."""
+Check = tuple[Any, str, str]
+
+
+def length_checks(energy: Energy, section: Section, reading: Components, more: str) -> Iterable[Check]:
+    """The lengths that the energy is made of."""
     tree = section.expand(energy.expression)
     for node in dict.fromkeys(n for n in tree.walk() if n.op == "norm"):
         if section.type_of(node.args[0]).value == "vector":
-            ends = [n.name.label for n in node.args[0].walk() if n.op == "symbol"]
-            yield (
-                reading.value(node),
-                "energy",
-                f"the segment {'-'.join(sorted(ends))} has length zero, or so little that its square vanishes",
-            )
+            ends = [n.name for n in node.args[0].walk() if n.op == "symbol"]
+            yield reading.value(node), "energy", zero_length(ends, more)
+
+
+def zero_length(ends: Iterable[Name], more: str = "") -> str:
+    """What is wrong with a segment without length."""
+    return f"the segment {'-'.join(sorted(n.label for n in ends))} has length zero{more}"
+
+
+def domain_checks(energy: Energy, reading: Components) -> Iterable[Check]:
+    """The declared domain, where leaving it is an error."""
     if energy.elsewhere != "zero":
         for assumption in energy.domain:
             margin = reading.value(assumption.left) - reading.value(assumption.right)
             yield margin, "energy", f"{_plain(assumption.left)} > {_plain(assumption.right)} does not hold"
 
 
-def _active(energy: Energy, reading: Components) -> Any:
+def active(energy: Energy, reading: Components) -> Any:
     """What must be positive for the energy to act at all; None where it always does."""
     if energy.elsewhere != "zero":
         return None
@@ -232,34 +273,25 @@ def _plain(expr: Expr) -> str:
     return latex(expr).replace("_", "").replace("\\", "")
 
 
-def _settled(
+def settled(
     steps: Mapping[sp.Symbol, Any],
     energy: Any,
     gradient: list[Any],
     hessian: list[Any],
-    checks: list[tuple[Any, str, str]],
-    active: Any,
+    checks: list[Check],
+    choice: Any,
+    rewrite: Callable[[Any], Any] = lambda value: value,
 ) -> Program:
-    """Drop steps that nothing needs, share common subexpressions, count operations."""
-    kept = _needed(steps, [energy, *gradient, *hessian, *(c[0] for c in checks)])
-    roots = [*kept.values(), energy, *gradient, *hessian, *(check[0] for check in checks)]
+    """Drop steps that nothing needs, and share common subexpressions. ``rewrite`` is applied to every expression first."""
+    choices = [] if choice is None else [choice]
+    outputs = [energy, *gradient, *hessian, *(check[0] for check in checks), *choices]
+    kept = _needed(steps, outputs)
+    roots = [rewrite(sp.sympify(value)) for value in (*kept.values(), *outputs)]
     shared, reduced = sp.cse(roots, symbols=(sp.Symbol(f"t{i}", real=True) for i in range(10**6)), order="canonical")
     everything, rest = _numbered(*_without_aliases(dict(shared), kept, reduced))
-    g, h = len(gradient), len(hessian)
-    outputs = {
-        "energy": [rest[0]],
-        "gradient": rest[1 : 1 + g],
-        "hessian": rest[1 + g : 1 + g + h],
-        "evaluate": rest[: 1 + g + h],
-    }
-    operations = {}
-    for key, values in outputs.items():
-        needed = _needed(everything, values)
-        operations[key] = int(sum(sp.count_ops(value) for value in (*needed.values(), *values)))
-    new_checks = tuple((v, c[1], c[2]) for v, c in zip(rest[1 + g + h :], checks, strict=True))
-    return Program(
-        everything, rest[0], tuple(outputs["gradient"]), tuple(outputs["hessian"]), new_checks, active, operations
-    )
+    g, h = 1 + len(gradient), 1 + len(gradient) + len(hessian)
+    new_checks = tuple((v, c[1], c[2]) for v, c in zip(rest[h : h + len(checks)], checks, strict=True))
+    return Program(everything, rest[0], tuple(rest[1:g]), tuple(rest[g:h]), new_checks, rest[-1] if choices else None)
 
 
 def _without_aliases(
@@ -313,40 +345,65 @@ def _needed(steps: Mapping[sp.Symbol, Any], outputs: Iterable[Any]) -> dict[sp.S
 
 
 class _Printer(NumPyPrinter):  # type: ignore[misc]
-    """NumPy code in which small integer powers are products."""
+    """Scalar code whose every operation is one that ``kernels.tape`` records; integer powers are products."""
 
     def _print_Pow(self, expr: Any, rational: bool = False, sqrt: str = "sqrt") -> str:
         base, exponent = expr.args
+        text = self._print(base)
+        if exponent == sp.Rational(1, 2):
+            return f"sqrt({text})"
+        if exponent.is_Rational and exponent.q == 2:
+            whole = abs(int(exponent - sp.sign(exponent) / 2))
+            power = f"sqrt({text})*{self._print(base**whole)}" if whole else f"sqrt({text})"
+            return f"({power})" if exponent > 0 else f"(1/({power}))"
         if not exponent.is_Integer:
-            return str(super()._print_Pow(expr, rational=rational))
-        text = self._print(base) if base.is_Symbol or base.is_Function else f"({self._print(base)})"
+            raise UnsupportedError(f"the power {expr}")
         size = abs(int(exponent))
-        power = "*".join([text] * size) if base.is_Symbol and size <= 4 else f"{text}**{size}"
-        power = text if size == 1 else f"({power})"
-        return power if exponent > 0 else f"(1/{power})"
+        inner = text if base.is_Symbol or base.is_Function else f"({text})"
+        product = "*".join([inner] * size) if base.is_Symbol and size <= 4 else f"power({text}, {size})"
+        product = inner if size == 1 else f"({product})" if base.is_Symbol and size <= 4 else product
+        return product if exponent > 0 else f"(1/{product})"
+
+    def _print_Pi(self, expr: Any) -> str:
+        return "PI"
+
+    def _print_sign(self, expr: Any) -> str:
+        return f"select({self._print(expr.args[0])}, 1.0, -1.0)"
+
+    def _print_Function(self, expr: Any) -> str:
+        return f"{expr.func.__name__}({', '.join(self._print(arg) for arg in expr.args)})"
 
 
 _PRINTER = _Printer({"fully_qualified_modules": False})
-_FUNCTIONS = {"arccos", "cos", "sin", "sqrt", "tan", "pi", "abs"}
+LIBRARY = {"arccos", "sin", "cos", "tan"}  # not correctly rounded, so not the same on every machine
+_FUNCTIONS = {
+    "tape": LIBRARY | {"power", "select", "sqrt"},
+ "geometry": {
+        "PI", "angle", "closing", "corner", "corner_exact", "deviation", "dot", "half_tangent", "normal_of", "right_corner",
+        "right_corner_exact", "scaled", "segment", "segment_exact", "total", "turning", "versine",
+    },
+}  # fmt: skip
 
 
 def text_of(value: Any) -> str:
     return str(_PRINTER.doprint(value))
 
 
-def statements(steps: Mapping[sp.Symbol, Any], outputs: Mapping[str, Any]) -> list[str]:
-    """Assignments that compute outputs such as ``G[0]``; outputs that are identically zero are left out."""
-    wanted = {target: value for target, value in outputs.items() if value != 0}
-    lines = [f"{symbol} = {text_of(value)}" for symbol, value in _needed(steps, wanted.values()).items()]
-    return lines + [f"{target} = {text_of(value)}" for target, value in wanted.items()]
+def statements(program: Program) -> list[str]:
+    """The assignments of a program, each before it is used."""
+    return [
+        *program.prologue,
+        *(f"{symbol} = {text_of(value)}" for symbol, value in _needed(program.steps, program.outputs).items()),
+    ]
 
 
-def used_functions(code: str) -> list[str]:
-    """The NumPy names that emitted code calls, in alphabetical order."""
-    return sorted(name for name in _FUNCTIONS - {"abs"} if re.search(rf"\b{name}\b", code))
+def used_functions(code: str, module: str) -> list[str]:
+    """The names of ``kernels.tape`` or ``kernels.geometry`` that emitted code uses, in alphabetical order."""
+    return sorted(name for name in _FUNCTIONS[module] if re.search(rf"\b{name}\b", code))
 
 
 __all__ = [
-    "Components", "Program", "dof_labels", "identifier", "map_value", "plain_program", "program", "row_symbols", "statements",
-    "text_of", "used_functions",
+    "LIBRARY", "Components", "Program", "active", "dof_labels", "domain_checks", "entries_of", "given_symbols", "identifier",
+    "length_checks", "map_value", "plain_program", "program", "row_symbols", "settled", "statements", "text_of",
+    "used_functions", "zero_length",
 ]  # fmt: skip

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from yarnverify.symbolic.numbers import Number, UndefinedError
+
+
+@lru_cache(maxsize=64)
+def _upper(n: int) -> tuple[Any, Any]:
+    """Rows and columns of the upper triangle, row by row."""
+    return np.triu_indices(n)
 
 
 def _sum(a: Any, b: Any) -> Any:
@@ -19,12 +26,26 @@ def _scaled(a: Any, scale: Number) -> Any:
 
 
 class Jet:
-    """A value with its gradient (n,) and Hessian (n, n); without ``first`` a constant, without ``second`` linear."""
+    """A value with its gradient (n,) and, of its Hessian, the upper triangle row by row (n (n + 1) / 2,).
 
-    __slots__ = ("first", "second", "value")
+    Without ``first`` it is a constant, without ``packed`` it is linear.
+    """
 
-    def __init__(self, value: Number, first: Any = None, second: Any = None) -> None:
-        self.value, self.first, self.second = value, first, second
+    __slots__ = ("first", "packed", "value")
+
+    def __init__(self, value: Number, first: Any = None, packed: Any = None) -> None:
+        self.value, self.first, self.packed = value, first, packed
+
+    @property
+    def second(self) -> Any:
+        """The Hessian (n, n); None for a constant."""
+        if self.first is None:
+            return None
+        n = len(self.first)
+        rows, columns = _upper(n)
+        full = np.zeros((n, n), dtype=self.first.dtype) if self.packed is None else np.empty((n, n), self.packed.dtype)
+        full[rows, columns] = full[columns, rows] = self.first[rows] * 0 if self.packed is None else self.packed
+        return full
 
     @staticmethod
     def _lift(other: Any) -> Jet:
@@ -36,15 +57,15 @@ class Jet:
         other = self._lift(other)
         if self.first is None or other.first is None:
             some = self if other.first is None else other
-            return Jet(self.value + other.value, some.first, some.second)
-        return Jet(self.value + other.value, self.first + other.first, _sum(self.second, other.second))
+            return Jet(self.value + other.value, some.first, some.packed)
+        return Jet(self.value + other.value, self.first + other.first, _sum(self.packed, other.packed))
 
     __radd__ = __add__
 
     def __neg__(self) -> Jet:
         if self.first is None:
             return Jet(-self.value)
-        return Jet(-self.value, -self.first, None if self.second is None else -self.second)
+        return Jet(-self.value, -self.first, None if self.packed is None else -self.packed)
 
     def __sub__(self, other: Any) -> Jet:
         return self + (-other)
@@ -59,10 +80,12 @@ class Jet:
         a, b = self.value, other.value
         if self.first is None or other.first is None:
             scale, some = (a, other) if self.first is None else (b, self)
-            return Jet(a * b) if some.first is None else Jet(a * b, some.first * scale, _scaled(some.second, scale))
-        mixed = np.outer(self.first, other.first)
-        bent = _sum(_scaled(self.second, b), _scaled(other.second, a))
-        return Jet(a * b, self.first * b + other.first * a, _sum(bent, mixed + mixed.T))
+            return Jet(a * b) if some.first is None else Jet(a * b, some.first * scale, _scaled(some.packed, scale))
+        rows, columns = _upper(len(self.first))
+        mixed = self.first[rows] * other.first[columns]
+        mixed = mixed + (mixed if self is other else self.first[columns] * other.first[rows])
+        bent = _sum(_scaled(self.packed, b), _scaled(other.packed, a))
+        return Jet(a * b, self.first * b + other.first * a, _sum(bent, mixed))
 
     __rmul__ = __mul__
 
@@ -70,8 +93,9 @@ class Jet:
         """``f(self)`` from f, f', f'' at the value."""
         if self.first is None:
             return Jet(value)
-        bent = np.outer(self.first, self.first) * bend
-        return Jet(value, self.first * slope, _sum(_scaled(self.second, slope), bent))
+        rows, columns = _upper(len(self.first))
+        bent = (self.first * bend)[rows] * self.first[columns]
+        return Jet(value, self.first * slope, _sum(_scaled(self.packed, slope), bent))
 
     def inverse(self) -> Jet:
         if self.value == 0:
@@ -84,7 +108,7 @@ class Jet:
             return self * other.inverse()
         if self.first is None:
             return Jet(self.value / other)
-        return Jet(self.value / other, self.first / other, None if self.second is None else self.second / other)
+        return Jet(self.value / other, self.first / other, None if self.packed is None else self.packed / other)
 
     def __rtruediv__(self, other: Any) -> Jet:
         return self.inverse() * other

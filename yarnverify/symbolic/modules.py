@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -10,20 +11,39 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from yarnverify.errors import NotRunError
 from yarnverify.source import load
-from yarnverify.symbolic.court import Court, Verdict
+from yarnverify.symbolic.angles import prove_derivatives, prove_recurrence, turning_series
+from yarnverify.symbolic.court import Court, Finding, Verdict
 from yarnverify.symbolic.declare import Declarations, Energy, load_declarations
-from yarnverify.symbolic.derive import declared_section, derive_declared
+from yarnverify.symbolic.derive import Derivation, declared_section, derive_declared
 from yarnverify.symbolic.document import Claim, Document, Section, block_of
-from yarnverify.symbolic.emit import Program, dof_labels, identifier, plain_program, program, statements, used_functions
+from yarnverify.symbolic.emit import (
+    LIBRARY,
+    Program,
+    dof_labels,
+    identifier,
+    plain_program,
+    program,
+    statements,
+    text_of,
+    used_functions,
+)
+from yarnverify.symbolic.measures import NoMeasuresError
 from yarnverify.symbolic.prove import read_with
 from yarnverify.symbolic.reading import UnsupportedError
 from yarnverify.symbolic.repair import Workshop
+from yarnverify.symbolic.safe import safe_shapes
+from yarnverify.symbolic.safe_program import safe_program
 from yarnverify.symbolic.tree import FORCE, Expr
 
 SUMMARY = {
+    "accurate": "safe forms, the rounding errors of edges, products and sums carried along",
+    "fast": "safe forms in plain arithmetic, which lose what the rounding of differences explains",
+    "reference": "safe forms in pairs of doubles, rounded once; slow",
     "differentiated": "the derivative by SymPy, chain rule over the measures, common subexpressions shared",
     "printed": "the document's own formulas, misprints included",
 }
+VARIANTS = tuple(SUMMARY)
+_SERIES_TOP, _SERIES_DEGREE = Fraction(147, 1000), 12  # sin(t/4)^2 is 0.14645 for a right angle t
 
 
 def kernel_modules(
@@ -39,31 +59,66 @@ def kernel_modules(
     declarations = load_declarations(folder)
     energies = [energy for energy in declarations.energies if energy.document == document]
     printed = read_with(load(folder / document), declarations)
-    texts: dict[str, str] = {}
+    texts: dict[str, str] = {"series.py": series_module()}
     record: dict[str, Any] = {}
     for energy in energies:
-        advance(f"{energy.name}, differentiated", 2 * len(energies))
-        programs = {"differentiated": derived_program(energy, declarations)}
-        advance(f"{energy.name}, printed", 2 * len(energies))
-        programs["printed"], notes = printed_program(energy, printed)
-        for variant, made in programs.items():
-            note = notes if variant == "printed" else []
-            texts[f"{variant}/{energy.name}.py"] = _module(energy, variant, made, document, note)
-            record.setdefault(energy.name, {})[variant] = dict(made.operations)
+        for variant in VARIANTS:
+            advance(f"{energy.name}, {variant}", len(VARIANTS) * len(energies))
+            if variant == "printed":
+                made, notes = printed_program(energy, printed)
+                programs = [made]
+            else:
+                programs, notes = derived_programs(energy, declarations, variant)
+            text, counts = module_text(energy, variant, programs, document, notes)
+            texts[f"{variant}/{energy.name}.py"] = text
+            record.setdefault(energy.name, {})[variant] = counts
         texts[f"{energy.name}.py"] = _face(energy, default)
     for variant in SUMMARY:
         texts[f"{variant}/__init__.py"] = f'"""Variant ``{variant}``: {SUMMARY[variant]}. Generated."""\n'
     return dict(sorted(texts.items())), record
 
 
-def derived_program(energy: Energy, declarations: Declarations) -> Program:
-    """The program of the derived blocks, each of which is proved first."""
+def series_module() -> str:
+    """The polynomial that ``kernels.geometry`` uses, with its proof behind it."""
+    prove_derivatives()
+    prove_recurrence()
+    series = turning_series(_SERIES_TOP, _SERIES_DEGREE)
+    return _TEMPLATES.get_template("series.py.jinja").render(
+        bound=f"{float(series.bound * 2**53):.3g}",
+        top=float(series.top),
+        coefficients=[repr(value) for value in series.coefficients],
+    )
+
+
+def derived_programs(energy: Energy, declarations: Declarations, variant: str) -> tuple[list[Program], list[str]]:
+    """The programs of a derived variant, every block of which is proved first, and notes on what is not as wished."""
     derivation = derive_declared(energy, declarations.quantities)
     if derivation is None:
-        return plain_program(energy, declared_section(energy))
-    for block, finding in derivation.check().items():
+        return [plain_program(energy, declared_section(energy))], [
+            "this energy is no law of known measures: plain differentiation, nothing is done for its singular states"
+        ]
+    if variant != "differentiated":
+        try:
+            shapes = safe_shapes(derivation)
+        except NoMeasuresError:
+            note = "there is no safe form for this law; these are the differentiated formulas"
+            return [derived_program(energy, derivation)], [note]
+        for shape in shapes:
+            _require_proofs(f"{energy.name}, {shape.shape} shape", shape.check())
+        exact = variant == "accurate"
+        return [safe_program(energy, shape, exact, len(shapes) == 1) for shape in shapes], []
+    return [derived_program(energy, derivation)], []
+
+
+def _require_proofs(what: str, found: dict[str, Finding]) -> None:
+    for block, finding in found.items():
         if finding.verdict is not Verdict.PROVED:
-            raise NotRunError(f"{energy.name}: derived block {block} is {finding.verdict}: {finding.reason}")
+            raise NotRunError(f"{what}: derived block {block} is {finding.verdict}: {finding.reason}")
+
+
+def derived_program(energy: Energy, derivation: Derivation) -> Program:
+    """The program of the derived blocks as they are, each of which is proved first."""
+    _require_proofs(energy.name, derivation.check())
     formulas = {block: tree for first, rest in derivation.blocks(1) for block, tree in (first, *rest)}
     angles = [measure.symbol for measure in derivation.measures if measure.b is not None]
     return program(energy, derivation.section, derivation.law_tree, formulas, 1, angles)
@@ -140,31 +195,40 @@ def _title(energy: Energy) -> str:
     return energy.section or energy.name.replace("_", " ")
 
 
-def _module(energy: Energy, variant: str, made: Program, document: str, notes: list[str]) -> str:
+def module_text(
+    energy: Energy, variant: str, programs: list[Program], document: str, notes: list[str]
+) -> tuple[str, dict[str, int]]:
+    """The text of one kernel module, and its operation counts."""
     dofs = dof_labels(energy.unknowns)
     names = [identifier(parameter.name) for parameter in energy.parameters]
-    functions = _functions(made, [label.replace(".", "") for label in dofs], names)
-    code = "\n".join(line for function in functions for line in function["lines"])
+    functions = [_function(made, len(dofs)) for made in programs]
+    code = "\n".join(line for f in functions for line in (*f["lines"], *f["returned"]))
+    tape = used_functions(code, "tape")
     full, upper = f"({len(dofs)}, {len(dofs)}, n)", f"({len(dofs) * (len(dofs) + 1) // 2}, n)"
     units = f"{energy.unit}, {energy.unit}/m and {energy.unit}/m^2"
     vector, three = f"({len(dofs)}, n)", "tuple[Array, Array, Array]"
-    return _TEMPLATES.get_template("kernel.py.jinja").render(
-        energy=energy,
-        title=_title(energy),
-        variant=variant,
-        summary=SUMMARY[variant],
-        notes=notes,
-        source=f"derivations/{energy.name}.py" + (f" and derivations/{document}" if variant == "printed" else ""),
-        counts=", ".join(f"{key} {count}" for key, count in made.operations.items()),
-        imports=used_functions(code),
-        dofs=_tuple(dofs),
-        parameters=_tuple(names),
-        names=names,
-        rows=len(dofs),
-        functions=functions,
-        checks=made.checks,
-        active=made.active is not None,
-        public=(
+    labels = [label.replace(".", "") for label in dofs]
+    angles_alone = any("corner" in line for line in code.splitlines()) and "segment" not in code
+    values = {
+        "energy": energy,
+        "title": _title(energy),
+        "variant": variant,
+        "summary": SUMMARY[variant],
+        "notes": notes,
+        "source": f"derivations/{energy.name}.py" + (f" and derivations/{document}" if variant == "printed" else ""),
+        "geometry": used_functions(code, "geometry"),
+        "tape": tape,
+        "dofs": _tuple(dofs),
+        "parameters": _tuple(names),
+        "names": names,
+        "powers": [length_power(parameter.unit) for parameter in energy.parameters],
+        "rows": len(dofs),
+        "unpack": ", ".join(labels) + ("," if len(labels) == 1 else ""),
+        "functions": functions,
+        "scaling": "points" if angles_alone else "lengths",
+        "portable": not LIBRARY & set(tape),
+        "numbers": "double-double" if variant == "reference" else "float",
+        "public": (
             ("energy", "(n,)", "Energy of each element", energy.unit, "Array"),
             ("gradient", vector, "Gradient, the negative of the force", f"{energy.unit}/m", "Array"),
             ("hessian", full, "Hessian, exactly symmetric", f"{energy.unit}/m^2", "Array"),
@@ -177,7 +241,38 @@ def _module(energy: Energy, variant: str, made: Program, document: str, notes: l
                 three,
             ),
         ),
+    }
+    template = _TEMPLATES.get_template("kernel.py.jinja")
+    counts = _operations(template.render(counts="", **values), energy.name)
+    shown = "\n".join(
+        f"Operations per element{f', {shape} shape' if len(counts) > 1 else ''}: "
+        + ", ".join(f"{key} {count}" for key, count in found.items())
+        for shape, found in counts.items()
     )
+    return template.render(counts=shown, **values), next(iter(counts.values()))
+
+
+def _operations(text: str, name: str) -> dict[str, dict[str, int]]:
+    """Operations per element of each shape and output, counted on what the kernel really does."""
+    namespace: dict[str, Any] = {}
+    exec(compile(text, f"<{name}>", "exec"), namespace)
+    kernel = namespace["KERNEL"]
+    wanted = {"energy": "E", "gradient": "G", "hessian": "H", "evaluate": "EGH"}
+    return {
+        shape.function.__name__[1:]: {
+            key: kernel.tape(i, outputs, "float64").operations for key, outputs in wanted.items()
+        }
+        for i, shape in enumerate(kernel.shapes)
+    }
+
+
+def length_power(unit: str) -> int:
+    """The power of length in a unit such as ``N m^2``, the newton taken as a base unit."""
+    total = 0
+    for factor in unit.split():
+        base, _, exponent = factor.partition("^")
+        total += {"m": 1, "J": 1}.get(base, 0) * int(exponent or 1)
+    return total
 
 
 def _tuple(names: Iterable[str]) -> str:
@@ -185,34 +280,24 @@ def _tuple(names: Iterable[str]) -> str:
     return f"({inner[0]},)" if len(inner) == 1 else f"({', '.join(inner)})"
 
 
-def _functions(made: Program, rows: list[str], names: list[str]) -> list[dict[str, Any]]:
-    """Name, arguments and body of the private functions of a module."""
-    energy = {"E[:]": made.energy}
-    gradient = {f"G[{i}]": value for i, value in enumerate(made.gradient)}
-    hessian = {f"H[{i}]": value for i, value in enumerate(made.hessian)}
-    inputs = [f"{argument}: Array" for argument in ("q", *names)]
-    unpack = f"{', '.join(rows)}{',' if len(rows) == 1 else ''} = q"
-    found = []
-    for name, outputs, targets in (
-        ("_energy", energy, "E"),
-        ("_gradient", gradient, "G"),
-        ("_hessian", hessian, "H"),
-        ("_evaluate", {**energy, **gradient, **hessian}, "EGH"),
-    ):
-        arguments = ", ".join([*inputs, *(f"{target}: Array" for target in targets)])
-        found.append(
-            {
-                "name": name,
-                "arguments": arguments,
-                "returns": "None",
-                "lines": [unpack, *statements(made.steps, outputs)],
-            }
-        )
-    margins = {f"margin{i}": check[0] for i, check in enumerate(made.checks)}
-    lines = [unpack, *statements(made.steps, margins)] if margins else []
-    lines.append(f"return ({''.join(f'{margin}, ' for margin in margins).strip()})")
-    found.append({"name": "_margins", "arguments": ", ".join(inputs), "returns": "tuple[Array, ...]", "lines": lines})
-    if made.active is not None:
-        lines = [unpack, *statements(made.steps, {"active": made.active}), "return active"]
-        found.append({"name": "_active", "arguments": ", ".join(inputs), "returns": "Array", "lines": lines})
-    return found
+def _function(made: Program, rows: int) -> dict[str, Any]:
+    """Name, body and returned values of one private function of a module."""
+    choice = [] if made.choice is None else [made.choice]
+    groups = (made.gradient, made.hessian, [check[0] for check in made.checks], choice)
+    returned = [text_of(made.energy) + ","]
+    for group in groups:
+        returned += _wrapped([text_of(value) for value in group])
+    return {"name": made.name, "lines": statements(made), "returned": returned, "checks": made.checks}
+
+
+def _wrapped(values: list[str], width: int = 108) -> list[str]:
+    """A tuple over several lines."""
+    if len(values) < 2:
+        return [f"({values[0]},)," if values else "(),"]
+    lines, line = [], ""
+    for value in values:
+        if line and len(line) + len(value) > width:
+            lines.append(line.rstrip())
+            line = ""
+        line += value + ", "
+    return ["(", *(f"    {text}" for text in [*lines, line.rstrip()]), "),"]

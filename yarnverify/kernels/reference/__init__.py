@@ -1,0 +1,1 @@
+"""Variant ``reference``: safe forms in pairs of doubles, rounded once; slow. Generated."""

@@ -1,0 +1,155 @@
+"""Programs of the rearranged blocks: what ``kernels.geometry`` provides, then the named steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import sympy as sp
+
+from yarnverify.symbolic.declare import Energy
+from yarnverify.symbolic.emit import (
+    Check,
+    Components,
+    Program,
+    active,
+    domain_checks,
+    entries_of,
+    given_symbols,
+    identifier,
+    row_symbols,
+    settled,
+    zero_length,
+)
+from yarnverify.symbolic.measures import Segment
+from yarnverify.symbolic.safe import Corner, Safe
+from yarnverify.symbolic.tree import Name
+
+_SMOOTH_UP_TO = sp.Rational(5, 8)  # cosine between the edges; beyond, the rows of the common point cancel
+
+
+def safe_program(energy: Energy, safe: Safe, exact: bool, alone: bool) -> Program:
+    """The program of one shape.
+
+    Parameters
+    ----------
+    energy, safe
+        What is computed, and how.
+    exact
+        Whether rounding errors of edges, products and sums are carried along.
+    alone
+        Whether this is the only shape, so that there is no choice.
+    """
+    formulas = {block: tree for first, rest in safe.blocks(1) for block, tree in (first, *rest)}
+    reading = Components(safe.section, formulas, forces=False, given=safe.given)
+    value, gradient, hessian = entries_of(energy, reading, safe.law, 1)
+    checks: list[Check] = []
+    segments = dict.fromkeys([m.a for m in safe.lengths] + ([safe.corner.a, safe.corner.b] if safe.corner else []))
+    for segment in segments:
+        checks.append((_symbol(segment.l.name), "energy", zero_length((segment.tail, segment.head))))
+    checks += domain_checks(energy, reading)
+    choice = active(energy, reading)
+    if safe.corner is not None and safe.shape == "smooth" and not alone:
+        choice = _SMOOTH_UP_TO - _symbol(safe.corner.name("C"))
+    if safe.corner is not None and safe.shape == "polar":
+        ends = "0 or pi" if alone else "0" if safe.corner.sign > 0 else "pi"
+        text = f"{safe.corner.symbol} is {ends}, where the energy has no derivative"
+        checks.append((_symbol(safe.corner.name("size")), "derivatives", text))
+    lengths = {_symbol(m.a.l.name): _low(m.a) for m in safe.lengths}
+    totals = _totals(energy, lengths)
+    if choice is not None:
+        choice = totals(sp.sympify(choice))  # whether an energy acts is a jump: never a matter of rounding
+    made = settled(reading.steps, value, gradient, hessian, checks, choice, totals if exact else lambda v: v)
+    code = [*made.steps.values(), *made.outputs]
+    used = {str(symbol) for step in code for symbol in step.free_symbols}
+    prologue = tuple(_prologue(safe, exact, used))
+    return Program(made.steps, made.energy, made.gradient, made.hessian, made.checks, made.choice, prologue, safe.shape)
+
+
+def _symbol(name: Name) -> sp.Symbol:
+    return given_symbols(name)[0]
+
+
+def _low(segment: Segment) -> sp.Symbol:
+    """The digits of a length below its last."""
+    return sp.Symbol(f"low_{segment.sub}", real=True)
+
+
+def _totals(energy: Energy, lengths: dict[sp.Symbol, sp.Symbol]) -> Callable[[Any], Any]:
+    """Sums of lengths, sliding coordinates and parameters, which may cancel, become calls of ``geometry.total``."""
+    inputs = {sp.Symbol(identifier(p.name), real=True) for p in energy.parameters}
+    inputs |= {symbol for n in energy.unknowns if not n.bold for symbol in row_symbols(n)}
+    total = sp.Function("total")
+
+    def is_sum(value: Any) -> bool:
+        if not value.is_Add:
+            return False
+        terms = [term.as_coeff_Mul() for term in value.args]
+        atoms = {symbol for _, symbol in terms}
+        known = all(abs(factor) == 1 and (symbol in inputs or symbol in lengths) for factor, symbol in terms)
+        return known and (len(terms) > 2 or bool(atoms & set(lengths)))
+
+    def call(value: Any) -> Any:
+        terms = sorted(
+            value.args, key=lambda term: (term.as_coeff_Mul()[1] not in lengths, str(term.as_coeff_Mul()[1]))
+        )
+        low = sum((factor * lengths[s] for factor, s in (t.as_coeff_Mul() for t in terms) if s in lengths), sp.S.Zero)
+        return total(low, *terms)
+
+    return lambda value: value.replace(is_sum, call)
+
+
+def _prologue(safe: Safe, exact: bool, used: set[str]) -> list[str]:
+    lines = []
+    corner = safe.corner
+    points = dict.fromkeys(p for m in safe.lengths for p in (m.a.tail, m.a.head))
+    points |= dict.fromkeys((corner.a.tail, corner.a.head, corner.b.head) if corner else ())
+    for point in sorted(points, key=safe.derivation.unknowns.index):
+        lines.append(f"{point.label} = {', '.join(map(str, row_symbols(point)))}")
+    suffix = "_exact" if exact else ""
+    for measure in safe.lengths:
+        s = measure.a
+        low = str(_low(s)) if str(_low(s)) in used else "_"
+        lines.append(
+            f"{_symbol(s.l.name)}, {low}, {identifier(s.d.name)} = segment{suffix}({s.tail.label}, {s.head.label})"
+        )
+        lines.append(_unpacked(s.d.name))
+    return [*lines, *(_corner_lines(safe, corner, exact, used) if corner else [])]
+
+
+def _unpacked(name: Name) -> str:
+    return f"{', '.join(map(str, given_symbols(name)))} = {identifier(name)}"
+
+
+def _corner_lines(safe: Safe, corner: Corner, exact: bool, used: set[str]) -> list[str]:
+    a, b = corner.a, corner.b
+
+    def atom(base: str) -> str:
+        return str(_symbol(corner.name(base)))
+
+    def vector(base: str) -> str:
+        return identifier(corner.name(base, bold=True))
+
+    kind = ("right_corner" if safe.centred else "corner") + ("_exact" if exact else "")
+    l_a, l_b, d_a, d_b = (identifier(symbol.name) for symbol in (a.l, b.l, a.d, b.d))
+    ends = f"{a.head.label}, {b.head.label}"
+    targets = f"{l_a}, {l_b}, {d_a}, {d_b}, {vector('normal')}, {atom('scale')}, {atom('C')}"
+    lines = [f"{targets} = {kind}({a.tail.label}, {ends})"]
+    lines += [_unpacked(name) for name in (a.d.name, b.d.name)]
+    cosine = atom("C") if corner.sign > 0 else f"-{atom('C')}"
+    if safe.shape == "smooth":
+        lines.append(f"{vector('m')} = scaled({vector('normal')}, {atom('scale')})")
+        lines.append(_unpacked(corner.name("m", bold=True)))
+        lines.append(f"{atom('S')} = dot({vector('m')}, {vector('m')})")
+        lines.append(f"{atom('A')}, {atom('f')}, {atom('g')} = turning({atom('S')}, {cosine})")
+        if atom("versine") in used:
+            lines.append(f"{atom('versine')} = versine({atom('S')}, {cosine})")
+        return lines
+    lines.append(f"{vector('n')}, {atom('size')} = normal_of({vector('normal')})")
+    lines.append(f"{atom('s')} = {atom('size')}*{atom('scale')}")
+    lines.append(_unpacked(corner.name("n", bold=True)))
+    theta = str(_symbol(corner.symbol))
+    functions = {theta: "angle", atom("psi"): "deviation", atom("half"): "half_tangent"}
+    lines += [f"{name} = {function}({atom('s')}, {cosine})" for name, function in functions.items() if name in used]
+    lines.append(f"{vector('v')}, {vector('k')} = closing({ends}, {l_a}, {l_b}, {d_a}, {d_b})")
+    return [*lines, *(_unpacked(corner.name(base, bold=True)) for base in ("v", "k"))]
