@@ -43,9 +43,9 @@ def sizes(dof: int) -> int:
     return dof * (dof + 1) // 2
 
 
-def outputs_bytes(dof: int, packed: bool = True) -> int:
-    """Bytes per element that a call reads and writes: q, energy, gradient, Hessian."""
-    return 8 * (dof + 1 + dof + (sizes(dof) if packed else dof * dof))
+def outputs_bytes(dof: int) -> int:
+    """Bytes per element that a call reads and writes: q, energy, gradient, packed Hessian."""
+    return 8 * (dof + 1 + dof + sizes(dof))
 
 
 def chunks(n: int, chunk: int | None) -> Iterator[slice]:

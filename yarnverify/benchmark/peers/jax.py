@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 
 from yarnverify.benchmark.peers.walk import FORMS, Functions, energy_of
-from yarnverify.benchmark.ways import Array, Outputs, Way, chunks, degrees_of_freedom, outputs_bytes
+from yarnverify.benchmark.ways import Array, Outputs, Way, chunks, degrees_of_freedom, outputs_bytes, sizes
 from yarnverify.symbolic.declare import Energy
 
 PACKAGES = ("jax", "jaxlib")
@@ -56,30 +56,36 @@ def ways(energy: Energy) -> tuple[Way, ...]:
     for form, functions, hessians in ((FORMS[1], _ARRAYS, _HESSIANS), (FORMS[0], _FUNCTIONS, _HESSIANS[:1])):
         for name, hessian in hessians:
             own = value(functions, form)
-            function = jax.jit(jax.vmap(_all(own, hessian(own)), in_axes=(1, None)))
             for chunk in (None, CHUNK):
+                # taking the upper triangle pays where a chunk is still in the cache, and does not for a whole batch
+                outputs = _all(own, hessian(own), None if chunk is None else np.triu_indices(dof))
+                function = jax.jit(jax.vmap(outputs, in_axes=(1, None)))
                 found.append(_way(f"jit(vmap({name})), {form}", function, chunk, dof, parameters))
     return tuple(found)
 
 
-def _all(value: Callable[..., Any], hessian: Callable[..., Any]) -> Callable[..., Any]:
+def _all(value: Callable[..., Any], hessian: Callable[..., Any], upper: Any) -> Callable[..., Any]:
     def outputs(q: Any, values: Any) -> Any:
         energy, gradient = jax.value_and_grad(value)(q, values)
-        return energy, gradient, hessian(q, values)
+        full = hessian(q, values)
+        return energy, gradient, full if upper is None else full[upper]
 
     return outputs
 
 
 def _way(name: str, function: Any, chunk: int | None, dof: int, parameters: int) -> Way:
-    def run(q: Array, values: tuple[float, ...]) -> Outputs:
+    def whole(q: Array, values: tuple[float, ...]) -> Outputs:
+        e, g, h = jax.block_until_ready(function(q, np.array(values)))
+        return np.asarray(e), np.asarray(g), np.asarray(h)
+
+    def chunked(q: Array, values: tuple[float, ...]) -> Outputs:
         n, given = q.shape[1], np.array(values)
-        if chunk is None or n <= chunk:
-            e, g, h = jax.block_until_ready(function(q, given))
-            return np.asarray(e), np.asarray(g), np.asarray(h)
-        out = np.empty(n), np.empty((n, dof)), np.empty((n, dof, dof))
+        if n <= CHUNK:
+            return whole(q, values)
+        out = np.empty(n), np.empty((n, dof)), np.empty((n, sizes(dof)))
         for where in chunks(n, chunk):
-            for whole, part in zip(out, function(q[:, where], given), strict=True):
-                whole[where] = part
+            for all_of_it, part in zip(out, function(q[:, where], given), strict=True):
+                all_of_it[where] = part
         return out
 
     def bytes_at(n: int) -> int:
@@ -87,7 +93,9 @@ def _way(name: str, function: Any, chunk: int | None, dof: int, parameters: int)
         shapes = (jax.ShapeDtypeStruct((dof, m), np.float64), jax.ShapeDtypeStruct((parameters,), np.float64))
         analysis = function.lower(*shapes).compile().memory_analysis()
         own = int(analysis.temp_size_in_bytes) + int(analysis.output_size_in_bytes)
-        return own + n * outputs_bytes(dof, packed=False)
+        return own + n * (8 * dof if chunk is None else outputs_bytes(dof))
 
     how = f"{name}, {f'chunks of {chunk}' if chunk else 'whole batch'}"
-    return Way(how, "full", "element-first", run, bytes_at)
+    if chunk is None:
+        return Way(how, "full", "element-first", whole, bytes_at)
+    return Way(how, "packed", "element-first", chunked, bytes_at)
