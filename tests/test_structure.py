@@ -36,7 +36,7 @@ def outside(names: set[str], allowed: tuple[str, ...]) -> set[str]:
 
 RULES = [
     ("kernels", ("numpy", "yarnverify.kernels")),
-    ("report", ("jinja2", "yarnverify.report")),
+    ("report", ("jinja2", "matplotlib", "yarnverify.report")),
 ]
 
 
@@ -51,7 +51,9 @@ def test_import_rules(folder: str, allowed: tuple[str, ...]) -> None:
 def test_sympy_lives_in_symbolic_and_nowhere_else() -> None:
     for path in sorted(PACKAGE.rglob("*.py")):
         # the truth of accuracy/ is ball arithmetic; it must not see the derivation that it judges
+        # people who do without kernels start from SymPy, and so do some of the peers
         barred = () if "symbolic" in path.parts else ("sympy",) if "accuracy" in path.parts else ("sympy", "flint")
+        barred = ("flint",) if "peers" in path.parts else barred
         assert not any(name.split(".")[0] in barred for name in imports(path)), path
 
 
@@ -82,6 +84,19 @@ def test_nothing_heavy_is_imported_for_help() -> None:
     code = (
         "import sys; from yarnverify.cli import app; import yarnverify.kernels.runtime\n"
         "print(sorted({'sympy', 'lark', 'flint', 'rich.table', 'jinja2', 'matplotlib', 'hypothesis'} & set(sys.modules)))"
+    )
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert shown.strip() == "[]"
+
+
+def test_peers_and_pictures_are_imported_only_where_they_are_wanted() -> None:
+    for path in sorted(PACKAGE.rglob("*.py")):
+        allowed = {"peers": ("jax", "casadi", "numba"), "report": ("matplotlib",)}.get(path.parent.name, ())
+        for name in ("jax", "casadi", "numba", "matplotlib"):
+            assert name in allowed or not any(found.split(".")[0] == name for found in imports(path)), path
+    code = (
+        "import sys; import yarnverify.benchmark.run, yarnverify.benchmark.show\n"
+        "print(sorted({'jax', 'casadi', 'numba', 'sympy.printing.pycode', 'matplotlib'} & set(sys.modules)))"
     )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert shown.strip() == "[]"

@@ -1,4 +1,4 @@
-"""The command line: ``yarnverify prove | derive | generate | accuracy | fuzz | report``.
+"""The command line: ``yarnverify prove | derive | generate | accuracy | benchmark | fuzz | report``.
 
 Exit status: 0 all as expected; 1 a check failed, or an erratum is new or stale; 2 bad usage or input; 3 asked for but
 could not run. Heavy imports happen inside the commands, so that ``--help`` answers at once.
@@ -197,6 +197,47 @@ def accuracy(
         names = () if energy is None else (energy,)
         outcome = measured(names, variant, profile, executor, jobs, state, out, write, check, advance)
     _finish(outcome, json_file)
+
+
+@app.command
+def benchmark(
+    energy: str | None = None,
+    /,
+    *,
+    sizes: Annotated[
+        list[int] | None,
+        Parameter(help="Batch sizes; 1, 10, ..., 10^6 by default.", consume_multiple=True, negative=""),
+    ] = None,
+    peers: Annotated[
+        list[str] | None,
+        Parameter(
+            help="Whom to measure beside the kernels; all by default, or none.", consume_multiple=True, negative=""
+        ),
+    ] = None,
+    threads: Annotated[int, Parameter(help="Threads for the kernels; everybody else runs on one.")] = 1,
+    rounds: Annotated[int | None, Parameter(help="Paired repetitions; 7 by default.")] = None,
+    pictures: Annotated[
+        Path | None, Parameter(help="Folder for pictures of speed against error; none are drawn by default.")
+    ] = None,
+    json_file: Json = None,
+) -> None:
+    """Speed of every kernel, batch size by batch size, next to what people would use instead.
+
+    Parameters
+    ----------
+    energy
+        Name of a declared energy, such as bending; all by default.
+    """
+    from yarnverify.benchmark.command import measure
+
+    with progress("measuring") as advance:
+        record, asked_and_missing = measure(energy, sizes, peers, threads, rounds, pictures, advance)
+    if not _json(record, json_file):
+        from yarnverify.benchmark.show import show_benchmark
+
+        show_benchmark(record)
+    if asked_and_missing:
+        _stop(asked_and_missing, 3)
 
 
 @app.command

@@ -1,0 +1,149 @@
+"""Pictures from records alone: the same bytes twice, and everybody on them."""
+
+from __future__ import annotations
+
+import copy
+import math
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+
+from yarnverify.report.marks import front, mark, spaced
+from yarnverify.report.pictures import error_against_angle, speed_against_error, write
+
+DISTANCES = [10.0**-k for k in range(0, 16, 3)]
+VARIANTS = ("printed", "accurate", "newcomer")
+
+
+def curve(towards: str, condition: float = 1e6) -> dict[str, Any]:
+    growing: list[Any] = [1.0 / d for d in DISTANCES]
+    broken = [*growing[:2], "inf", "inf", None, 3e39]
+    lines = {"printed": broken, "accurate": [4.0] * 6, "newcomer": growing}
+    return {
+        "energy": "bending",
+        "dtype": "float64",
+        "towards": towards,
+        "distance": DISTANCES,
+        "condition": {output: [1.0, condition, 2.0, 3.0, None, "inf"] for output in "EGH"},
+        "variants": {name: dict.fromkeys("EGH", line) for name, line in lines.items()},
+    }
+
+
+ACCURACY = {"curves": [curve("0"), curve("pi"), curve("right angle", 2.0), {**curve("0"), "dtype": "float32"}]}
+ERRORS = {
+    "mixed": {"accurate": 5.0, "printed": 30.0, "jax": 40.0, "newcomer": 2.0},
+    "1e-8 from rest": {"accurate": 6.0, "printed": None, "jax": None, "newcomer": 1e20},
+}
+SPEED = {
+    "energies": {
+        "bending": {
+            "contestants": {
+                name: {"kind": kind}
+                for name, kind in (("accurate", "kernel"), ("printed", "kernel"), ("jax", "peer"), ("newcomer", "peer"))
+            },
+            "states": {
+                "mixed": [
+                    {
+                        "n": 100,
+                        "ns": {
+                            "accurate": [250.0, 240.0, 300.0],
+                            "printed": [500.0, 450.0, 600.0],
+                            "jax": [1000.0, 900.0, 1100.0],
+                            "newcomer": [9000.0, 8000.0, 9900.0],
+                            "memory floor": [10.0, 9.0, 11.0],
+                        },
+                    }
+                ]
+            },
+            "errors": {
+                state: {name: dict.fromkeys("EGH", value) for name, value in by_name.items()}
+                for state, by_name in ERRORS.items()
+            },
+        }
+    }
+}
+PICTURES = {
+    "angle": lambda: error_against_angle(ACCURACY, "bending"),
+    "speed": lambda: speed_against_error(SPEED, "bending"),
+}
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_the_same_record_gives_the_same_bytes(name: str, tmp_path: Path) -> None:
+    files = [write(PICTURES[name], tmp_path / f"{name}{i}") for i in range(2)]
+    for one, two in zip(*files, strict=True):
+        assert one.read_bytes() == two.read_bytes()
+    svg = files[0][0].read_text()
+    assert svg.startswith("<?xml") and "<dc:date>" not in svg
+    assert files[0][1].read_bytes().startswith(b"\x89PNG")
+
+
+def test_records_are_not_changed_by_drawing(tmp_path: Path) -> None:
+    before = copy.deepcopy((ACCURACY, SPEED))
+    for name, draw in PICTURES.items():
+        write(draw, tmp_path / name)
+    assert before == (ACCURACY, SPEED)
+
+
+def texts(figure: Any) -> list[str]:
+    from matplotlib.text import Text
+
+    return [text.get_text() for text in figure.findobj(Text) if text.get_text()]
+
+
+def test_everybody_is_named() -> None:
+    figure = error_against_angle(ACCURACY, "bending")
+    assert figure is not None
+    assert len(figure.axes) == 6  # three outputs, towards 0 and pi; nothing happens at the right angle
+    for name in VARIANTS:
+        assert texts(figure).count(name) == 4  # at the end of three lines, and in the legend
+    shown = texts(speed_against_error(SPEED, "bending"))
+    for name in ("accurate", "printed", "jax", "newcomer"):
+        assert shown.count(name) == 2, name
+    assert "memory floor" not in shown
+
+
+def test_the_right_angle_is_shown_where_the_condition_grows() -> None:
+    record = {"curves": [curve("0"), curve("right angle"), curve("pi")]}
+    figure = error_against_angle(record, "bending")
+    assert figure is not None and len(figure.axes) == 9
+    assert error_against_angle(record, "stretch") is None
+
+
+def test_what_is_not_finite_lies_in_the_band_at_the_top() -> None:
+    figure = error_against_angle({"curves": [curve("0")]}, "bending")
+    assert figure is not None
+    axes = figure.axes[0]
+    marks = [line for line in axes.lines if line.get_linestyle() == "None"]
+    heights = [height for line in marks for height in line.get_ydata()]
+    assert heights and all(7e18 < height < axes.get_ylim()[1] for height in heights)
+    solid = [line for line in axes.lines if len(line.get_ydata()) == len(DISTANCES) and line not in marks]
+    drawn = [height for line in solid for height in line.get_ydata() if not math.isnan(height)]
+    assert max(drawn) < 7e18
+
+
+def test_marks_differ_without_colour() -> None:
+    names = ["accurate", "fast", "reference", "differentiated", "printed", "lambdify", "jax", "casadi", "numba"]
+    names += ["differences", "one", "two", "three", "four"]
+    assert len({mark(name, names).marker for name in names}) == len(names)
+    assert len({str(mark(name, names).line) for name in names[:5]}) == 5
+
+
+def test_the_front() -> None:
+    points = {"a": (1.0, 9.0), "b": (2.0, 5.0), "c": (3.0, 5.0), "d": (2.5, 7.0), "e": (4.0, 1.0), "f": (5.0, math.inf)}
+    assert front(points) == ["a", "b", "e"]
+    assert front({"slow": (2.0, math.inf), "fast": (1.0, math.inf)}) == ["fast"]
+    assert front({"twin": (1.0, 1.0), "other": (1.0, 1.0)}) == ["other", "twin"]
+
+
+def test_names_are_moved_apart_and_keep_their_order() -> None:
+    assert spaced([1.0, 5.0, 3.0], 1.0, 0.0, 10.0) == [1.0, 5.0, 3.0]
+    assert spaced([2.0, 2.0, 2.0], 1.0, 0.0, 10.0) == [1.0, 2.0, 3.0]
+    assert spaced([0.0, 0.0], 1.0, 0.0, 10.0) == [0.0, 1.0]
+    assert spaced([9.9, 10.0, 9.8], 1.0, 0.0, 10.0) == [9.0, 10.0, 8.0]
+    crowded = spaced([1.0, 1.2, 1.9, 2.4, 8.0], 1.0, 0.0, 10.0)
+    assert all(b - a >= 1 - 1e-9 for a, b in pairwise(crowded))
