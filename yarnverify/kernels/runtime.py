@@ -260,7 +260,9 @@ class _Run:
         targets = self._targets(slice(0, 1))
         rest = found[len(targets) :]
         margins = rest[: len(kernel.shapes[0].checks)]
-        if not all(1 / self.limit < m < self.limit for m in margins) or not all(0 < c < math.inf for c in rest[len(margins) :]):
+        if not all(1 / self.limit < m < self.limit for m in margins) or not all(
+            0 < c < math.inf for c in rest[len(margins) :]
+        ):
             return False
         for target, value in zip(targets, found, strict=False):
             target[0] = value

@@ -29,9 +29,7 @@ _SMOOTH_UP_TO = sp.Rational(5, 8)  # cosine between the edges; beyond, the rows 
 _PLAIN_DOWN_TO = sp.Rational(1, 2**16)  # sine; a plain cross product keeps some 37 of 53 bits there
 
 
-def safe_program(
-    energy: Energy, safe: Safe, exact: bool, shapes: tuple[Safe, ...], guarded: bool = False
-) -> Program:
+def safe_program(energy: Energy, safe: Safe, exact: bool, shapes: tuple[Safe, ...], guarded: bool = False) -> Program:
     """The program of one shape.
 
     Parameters
