@@ -118,6 +118,16 @@ class Court:
     def _energy_value(self) -> Value:
         return self.field.value(self.energy)
 
+    @property
+    def without_value(self) -> bool:
+        """Whether the energy divides by what is zero everywhere."""
+        try:
+            return self._energy_value is None
+        except ZeroDivisionError:
+            return True
+        except UnsupportedError:
+            return False
+
     @cached_property
     def _blocks(self) -> dict[Expr, Value]:
         return {}
@@ -329,7 +339,7 @@ class Court:
             return Finding(
                 Verdict.INCONSISTENT, "a denominator is zero as a normal form, and has a value at an exact state"
             )
-        if not compared.differs and self.field.root_count > 1:
+        if not compared.differs and not self.field.settles:
             return Finding(
                 Verdict.UNDECIDED, "equal at every exact state tried, but the square roots could not be settled"
             )

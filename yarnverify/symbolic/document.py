@@ -317,6 +317,12 @@ def _read_document(source: Source, declare: Callable[[Section], Energy | None]) 
             continue
         if section.energy is None:
             source.fail(section.offset, f"section '{section.title}' has no energy: it needs a numbered display V = ...")
+        for node in section.energy.expression.walk():
+            if node.op in {"energy", "force", "derivative"}:
+                what = "by itself" if node.op == "energy" else "by its own forces or derivatives"
+                source.fail(
+                    node.span[0], f"equation ({section.energy.relation.equation}): the energy is defined {what}"
+                )
         _unknowns(section, own)
         for relation in pending:
             section.claims += _claims(relation)

@@ -30,8 +30,8 @@ from sympy.polys.orderings import lex
 from sympy.polys.rings import ring
 
 from yarnverify.symbolic.document import Section
-from yarnverify.symbolic.reading import Reading, UnsupportedError, Value
-from yarnverify.symbolic.tree import Name
+from yarnverify.symbolic.reading import Reading, UnsupportedError, Value, fold, plus
+from yarnverify.symbolic.tree import Expr, Name
 
 Poly = Any  # a SymPy PolyElement
 _LARGEST_PRODUCT = 60_000  # terms times terms; the paper's formulas stay below a tenth of it
@@ -150,6 +150,8 @@ class Field(Reading):
         self._positive = {f"length({name.label})" for name in self._points} | {str(name) for name in positive}
         self._rules: dict[str, Callable[[str, Name, int], Quotient]] = {}
         self._roots: dict[Poly, str] = {}
+        self._not_negative: list[Poly] = []  # sums of squares, and 1 - c^2 of angles between directions
+        self._signless = False
         self._factored: dict[Poly, tuple[Any, tuple[tuple[Poly, int], ...]]] = {}
         self._angles: list[tuple[Quotient, Quotient]] = []  # (cosine, angle)
         self._circles: list[tuple[Quotient, Quotient, Quotient]] = []  # (angle, sine, cosine)
@@ -269,7 +271,7 @@ class Field(Reading):
             odd = [self.ring.symbols[i].name for i, e in enumerate(poly.LM) if e % 2]
             if all(name in self._positive for name in odd):
                 return 1 if poly.LC > 0 else -1
-        for known in (*self._known_positive, *self._roots):  # what stands under a root is not negative
+        for known in (*self._known_positive, *self._not_negative):
             ratio = poly.LC / known.LC
             if poly == known * ratio:
                 return 1 if ratio > 0 else -1
@@ -296,14 +298,45 @@ class Field(Reading):
             elif power % 2 == 0:
                 one, power = Quotient(self, self.reduce(part**2)), power // 2
             else:
-                one = self._root(part**2)
+                one, self._signless = self._root(part**2), True
             result = result * (one**-power if invert else one**power)
         return result
 
     @property
-    def root_count(self) -> int:
-        """Number of square roots that have been met."""
-        return len(self._roots)
+    def settles(self) -> bool:
+        """Whether a normal form that is not zero should mean a difference: no relation between roots can be hidden.
+
+        Several square roots may depend on each other, and an absolute value of unknown sign is a root of a square.
+        """
+        return len(self._roots) <= 1 and not self._signless
+
+    def value(self, expr: Expr, blocks: Callable[[Expr], Value] | None = None) -> Value:
+        """As in ``Reading``; notes what cannot be negative whatever is printed.
+
+        That a root is printed makes its radicand not negative in its own formula alone, so this is no such case.
+        """
+        if expr.op == "norm":
+            self.value(expr.args[0], blocks)  # may hold printed roots of its own
+        before = len(self._roots)
+        value = super().value(expr, blocks)
+        if expr.op == "norm":
+            self._not_negative += [*self._roots][before:]
+        elif expr.op == "call" and expr.value == "arccos" and self._between_directions(expr.args[0]):
+            cosine = super().value(expr.args[0], blocks)
+            if not cosine.factors:
+                both = (1 - cosine * cosine, 1 - cosine, 1 + cosine)
+                self._not_negative += [q.numerator for q in both if q.numerator]
+        return value
+
+    def _between_directions(self, expr: Expr) -> bool:
+        """Whether a cosine is a product of two vectors of length 1, up to its sign."""
+        while expr.op in {"neg", "abs"} or (expr.op == "symbol" and self.section.meaning(expr.name) is not None):
+            expr = expr.args[0] if expr.op != "symbol" else self.section.meaning(expr.name)  # type: ignore[assignment]
+        if expr.op not in {"mul", "dot"} or len(expr.args) != 2:
+            return False
+        vectors = [self.value(arg.args[0] if arg.op == "transpose" else arg) for arg in expr.args]
+        flat = all(isinstance(vector, list) and not isinstance(vector[0], list) for vector in vectors)
+        return flat and all((fold([v * v for v in vector], plus) - 1).is_zero for vector in vectors)
 
     def _root(self, square: Poly) -> Quotient:
         """A generator for the square root of a polynomial; for p^2 it is the absolute value of p."""

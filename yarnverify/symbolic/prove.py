@@ -79,7 +79,13 @@ def try_document(
 
     Definitions and energies are compared with the declared ones where there are any, and are otherwise taken as given.
     Forces and Jacobians are judged against the energy and the definitions that the document itself prints. Where one of
-    these has an undefined symbol, the declared one stands in for it, so that the other verdicts are not lost.
+    these has an undefined symbol, the declared one stands in for it, so that the other verdicts are not lost. The same
+    holds for an energy that has no value anywhere.
+
+    Raises
+    ------
+    InputError
+        For an energy without a value that nothing is declared for.
     """
     judged: list[Judged] = []
     given: list[tuple[Section, Definition, str]] = []
@@ -108,11 +114,14 @@ def try_document(
             finding = court.judge(claim.left, claim.right)
             judged.append(_Appeal(court, blamed, declarations).judged(claim, "energy", finding))
             advance(section.energy.relation.equation)
-            if finding.undefined:
+            if finding.undefined or Court(section, truth).without_value:
                 truth = section.declared.expression
             elif finding.verdict is not Verdict.PROVED:
                 blamed = [*blamed, judged[-1]]
         court = Court(section, truth)
+        if court.without_value:
+            number = section.energy.relation.equation
+            document.source.fail(truth.span[0], f"equation ({number}): the energy has no value, it divides by zero")
         appeal = _Appeal(court, blamed, declarations)
         for claim in section.claims:
             judged.append(appeal.judged(claim, _kind(claim), court.judge(claim.left, claim.right)))

@@ -238,6 +238,8 @@ def _effect(judged: Judged) -> str | None:
                 true, printed = evaluation.value(claim.left), evaluation.value(claim.right)
             except UndefinedError:
                 continue
+            if not all(part.is_finite() for part in (*entries(true), *entries(printed))):
+                continue  # no ball holds it, for instance a root of what is zero at rest
             flip = -1 if claim.left.op == "neg" else 1
             return _compare(claim.block, true, printed, flip, bool(aside))
     finally:
