@@ -128,8 +128,13 @@ BAD = [
     ("", 1, "empty formula"),
     (r" \quad ", 1, "empty formula"),
     ("a^{0.5}", 4, "exponents are integers"),
-    ("a^{1/2}", 5, r"unexpected character '/'; write \frac"),
-    ("a / b", 3, r"unexpected character '/'; write \frac"),
+    ("a^{1/2}", 5, r"unexpected '/'; an exponent is an integer here"),
+    ("/ b", 1, r"unexpected '/'"),
+    ("a /", 4, "the formula ends"),
+    (r"\sin \theta / 2", 1, r"\sin ... / ... may mean two things"),
+    (r"\sin^2 \theta / 2", 1, r"\sin ... / ... may mean two things"),
+    (r"\sin 2", 7, "the formula ends"),
+    (r"a^T_", 2, "unexpected '^T'"),
     ("a^n", 3, "unexpected 'n'"),
     ("a^{n}", 4, "unexpected 'n'"),
     ("a^{1 + 1}", 6, "unexpected '+'"),
@@ -177,9 +182,9 @@ def test_a_bar_where_no_bar_can_stand_is_not_called_unpaired() -> None:
     assert "not paired" not in str(error.value)
 
 
-@pytest.mark.parametrize("text", [r"\sin 2 a", r"\cos 2 \theta", r"\sin 2(a + b)"])
-def test_a_function_of_a_number_times_more_is_refused_as_ambiguous(text: str) -> None:
-    """Every reader of `sin 2 a` takes it for sin(2 a); (sin 2) a would be a silent misreading."""
+@pytest.mark.parametrize("text", [r"\sin 2(a + b)", r"\sin 2 3"])
+def test_a_function_of_a_number_times_more_than_a_symbol_is_refused(text: str) -> None:
+    """Every reader of `sin 2 a` takes it for sin(2 a); beyond one symbol it is not clear where the argument ends."""
     with pytest.raises(InputError, match=r"^f:1:"):
         read_formula(text, "f")
 
@@ -264,7 +269,8 @@ BAD_TEXTS = [
     ("x\n\\begin{equation}\na = b\n\\end{equation}", "2:1", r"\\begin\{equation\} is not read here"),
     ("x\n \\begin{align*} a", "2:2", r"\\begin\{align\*\} is not read here"),
     ("\\[ a = b \\]", "1:1", r"\\\[ is not read here"),
-    ("so \\(a = b\\)", "1:4", r"\\\( is not read here"),
+    ("so \\(a = b\\)", "1:4", r"\\\( is not read here: write inline formulas"),
+    ("so \\[a\\]", "1:4", r"\\\[ is not read here"),
     ("$$\\begin{aligned} a = b \\end{aligned} \\quad (7)$$", "1:3", r"unknown LaTeX command \\begin"),
     ("$$a = b \\\\ c = d \\quad (7)$$", "1:9", "unknown LaTeX command"),
     ("$$a &= b \\quad (7)$$", "1:5", "unexpected character '&'"),
@@ -342,3 +348,35 @@ def test_line_endings_and_byte_order_mark_leave_places_alone(tmp_path: Path, mar
 
 def test_the_printed_zero_and_one_are_numbers() -> None:
     assert read_formula("1") == ONE and read_formula("0") == number(0)
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        (r"\sin 2\theta", r"\sin(2 \theta)"),
+        (r"\cos^2 3 \phi \mathbf{P}_1", r"\cos^2(3 \phi) \mathbf{P}_1"),
+        (r"\mathbf{d}^T_2 \mathbf{d}_1", r"\mathbf{d}_2^T \mathbf{d}_1"),
+        (r"\mathbf{d}^{\top}_{2} \mathbf{d}_1", r"\mathbf{d}_2^T \mathbf{d}_1"),
+        (r"l^2_1", r"l_1^2"),
+        (r"\mathbf{d}_2^{\mathrm{T}}", r"\mathbf{d}_2^T"),
+        (r"\mathbf{d}_2^{\mathsf{T}}", r"\mathbf{d}_2^T"),
+        (r"\mathbf{d}_2^\mathsf{T}", r"\mathbf{d}_2^T"),
+        (r"\mathbf{d}_2^\intercal", r"\mathbf{d}_2^T"),
+        (r"\big(u_1 - u_2\big)^3", r"(u_1 - u_2)^3"),
+        (r"\Bigl[u_1 - u_2\Bigr]^3", r"(u_1 - u_2)^3"),
+        (r"\bigl\| \mathbf{x}_1 \bigr\|", r"\|\mathbf{x}_1\|"),
+        (r"\biggl| u_1 \biggr|", r"|u_1|"),
+        (r"1/2 k u_1^2", r"\frac{1}{2} k u_1^2"),
+        (r"k (\phi - \pi/2) / (l_1 \sin \phi) \mathbf{d}_1", r"\frac{k (\phi - \frac{\pi}{2})}{l_1 \sin \phi} \mathbf{d}_1"),
+        (r"a / b / c", r"\frac{\frac{a}{b}}{c}"),
+        (r"\sin(\theta) / 2", r"\frac{\sin(\theta)}{2}"),
+    ],
+)
+def test_other_ways_of_writing_the_same(written: str, meant: str) -> None:
+    assert read_formula(written) == read_formula(meant)
+
+
+def test_a_symbol_between_escaped_parentheses_is_prose() -> None:
+    text = "Where \\(y\\) is not used.\n\n$$a = b \\quad (1)$$"
+    (relation,) = read(Source("f", text))
+    assert isinstance(relation, Relation) and relation.equation == "1"

@@ -173,6 +173,28 @@ def test_a_declared_energy_stands_in_for_one_that_divides_by_zero(edited: Any) -
     assert {finding.verdict for finding in found["6"]} == {Verdict.PROVED}
 
 
+@pytest.mark.parametrize(
+    ("assumed", "instead", "equation", "reason"),
+    [
+        ("u_1 - u_0 < d$", "u_1 - u_0 > d$", "42", "where in part the declared energy is zero"),
+        ("u_1 > u_0 > u_2$", "u_1 < u_0 < u_2$", "13", "while the energy is declared for u_1 > u_2"),
+        ("u_1 - u_0 > 0$", "u_1 - u_0 < 0$", "5", "while the energy is declared for u_1 > u_0"),
+    ],
+)
+def test_an_assumption_outside_the_declared_domain_refutes_the_energy(
+    source: Source, declarations: Declarations, assumed: str, instead: str, equation: str, reason: str
+) -> None:
+    assert source.text.count(assumed) == 1
+    text = source.text.replace(assumed, instead)
+    head, *sections = re.split(r"(?m)^(?=## )", text)
+    text = head + next(s for s in sections if rf"\quad ({equation})$$" in s)
+    record = prove_source(Source("edition.md", text), shelf_for(Path("edition.md"), source.text))
+    (energy,) = [claim for claim in record["claims"] if claim["equation"] == equation]
+    assert energy["verdict"] == "refuted"
+    assert reason in energy["reason"]
+    assert energy["correction"] is None and energy["change"] is None
+
+
 def test_many_scalars_are_drawn_all_different() -> None:
     terms = " + ".join(f"k_{{{i}}} u_1^2" for i in range(40))
     text = f"## A\n\n$$V = {terms} \\quad (1)$$\n\n$$F_{{u_1}} = -2 u_1 ({terms.replace(' u_1^2', '')}) \\quad (2)$$\n"

@@ -56,12 +56,13 @@ class Witness:
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found of one claim."""
+    """What was found of one claim. One that is not ``mendable`` is wrong by more than its formula."""
 
     verdict: Verdict
     reason: str = ""
     witness: Witness | None = None
     undefined: tuple[Name, ...] = ()
+    mendable: bool = True
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 from yarnverify.source import Source
 from yarnverify.symbolic.court import Court, Finding, Verdict, undefined_symbols
-from yarnverify.symbolic.declare import Declarations, Energy, Quantity
+from yarnverify.symbolic.declare import Assumption, Declarations, Energy, Quantity
 from yarnverify.symbolic.document import Claim, Definition, Document, Section, block_of, instantiate, read_document
+from yarnverify.symbolic.latex import latex
+from yarnverify.symbolic.states import holds
 from yarnverify.symbolic.tree import ZERO, Expr, Name
 
 
@@ -112,11 +114,13 @@ def try_document(
             claim = Claim("V", Expr("energy", value=section.energy.symbol), truth, section.energy.relation, 0)
             court = Court(section, section.declared.expression, [truth])
             finding = court.judge(claim.left, claim.right)
+            if not finding.undefined:
+                finding = _outside_domain(court, section.declared, truth, finding)
             judged.append(_Appeal(court, blamed, declarations).judged(claim, "energy", finding))
             advance(section.energy.relation.equation)
             if finding.undefined or Court(section, truth).without_value:
                 truth = section.declared.expression
-            elif finding.verdict is not Verdict.PROVED:
+            elif finding.verdict is not Verdict.PROVED and finding.mendable:
                 blamed = [*blamed, judged[-1]]
         court = Court(section, truth)
         if court.without_value:
@@ -131,6 +135,26 @@ def try_document(
     starts = {relation.offset: i for i, relation in enumerate(document.relations)}
     judged.sort(key=lambda j: (order.get(id(j.claim.relation), starts.get(j.claim.relation.offset, 0)), j.claim.member))
     return Trial(document, tuple(judged), tuple(given), tuple(completeness))
+
+
+def _outside_domain(court: Court, declared: Energy, printed: Expr, finding: Finding) -> Finding:
+    """What was found of an energy, or its refutation: it is assumed where the declared one is zero, or only elsewhere."""
+
+    def text(assumptions: Iterable[Assumption]) -> str:
+        return ", ".join(f"{latex(a.left)} {'>' if a.strict else chr(92) + 'ge'} {latex(a.right)}" for a in assumptions)
+
+    outside = [e for e in court.exact if not all(holds(e, assumption) for assumption in declared.domain)]
+    assumed = text(court.section.assumptions)
+    if declared.elsewhere == "zero" and finding.verdict is Verdict.PROVED:
+        for evaluation in outside:
+            witness = court.certify(dict(evaluation.state), ZERO, printed)
+            if witness is not None:
+                reason = f"assumed for {assumed}, where in part the declared energy is zero"
+                return Finding(Verdict.REFUTED, reason, witness, mendable=False)
+    if outside and len(outside) == len(court.exact):
+        reason = f"assumed for {assumed}, while the energy is declared for {text(declared.domain)}"
+        return Finding(Verdict.REFUTED, reason, mendable=False)
+    return finding
 
 
 def _definitions(

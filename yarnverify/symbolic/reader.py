@@ -35,6 +35,7 @@ _PIECE = re.compile(
     r"|(?P<inline>\$)"
     r"|^(?P<marks>\#{1,6})[ \t]+(?P<title>[^\n]*?)[ \t\#]*$"
     r"|(?:\A|(?<=\n\n))(?P<count>\d+(?:\.\d+)*)\.?[ \t]+(?P<numbered>[A-Z][^\n.$]{0,80})(?=\n\n|\n?\Z)"
+    r"|\\\((?P<aside>[^$\n]*?)\\\)"
     r"|(?P<foreign>\\begin\s*\{\w+\*?\}|\\[\[(]|^```math\b)",
     re.MULTILINE,
 )
@@ -91,6 +92,10 @@ def read(source: Source) -> Iterator[Heading | Relation]:
             yield Heading(len(match["marks"]), match["title"], start)
         elif match["numbered"]:
             yield Heading(2 + match["count"].count("."), match["numbered"].strip(), start)
+        elif match["aside"] is not None and not _RELATION.search(match["aside"]):
+            continue  # \(y\) states nothing; a relation might be an assumption, which must not be lost
+        elif match["aside"] is not None:
+            source.fail(start, "\\( is not read here: write inline formulas as $ ... $")
         elif match["foreign"]:
             source.fail(start, f"{match['foreign']} is not read here: write displays as $$ ... \\quad (7)$$")
 
@@ -162,7 +167,7 @@ class _Bars:
     def process(self, stream: Iterator[Token]) -> Iterator[Token]:
         stack: list[Token] = []  # what is open: plain bars by their own type, explicit ones by that of \left|
         previous = ""
-        for token in stream:
+        for token in _subscripts_first(stream):
             plain = token.type in self._PAIRS
             if plain:
                 complete = previous in self._COMPLETE | self._CLOSERS or previous.endswith("_CLOSE")
@@ -183,6 +188,34 @@ class _Bars:
         for token in stack:
             if token.type in self._PAIRS or token.type.endswith("_OPEN"):
                 raise _UnpairedError(token)
+
+
+def _subscripts_first(stream: Iterator[Token]) -> Iterator[Token]:
+    """The tokens of ``d^T_2`` in the order of ``d_2^T``."""
+    waiting = list(stream)
+    at = 0
+    while at < len(waiting):
+        end = _end_of_subscript(waiting, at + 1) if waiting[at].type in {"TRANSPOSE", "SUP_DIGIT"} else at + 1
+        yield from waiting[at + 1 : end]
+        yield waiting[at]
+        at = end
+
+
+def _end_of_subscript(tokens: list[Token], at: int) -> int:
+    """Where a subscript that starts at a token ends; the token itself where none does."""
+    kinds = [token.type for token in tokens[at:]]
+    if kinds[:1] == ["SUB_CHARACTER"]:
+        return at + 1
+    if kinds[:1] != ["_UNDERSCORE"]:
+        return at
+    if kinds[1:2] != ["LBRACE"]:
+        return min(at + 2, len(tokens))
+    depth = 0
+    for end, kind in enumerate(kinds[1:], at + 2):
+        depth += (kind == "LBRACE") - (kind == "RBRACE")
+        if depth == 0:
+            return end
+    return at
 
 
 @v_args(meta=True)
@@ -213,8 +246,32 @@ class _Build(Transformer[Token, Any]):
             terms.append(Expr("neg", (term,), None, span) if negative else term)
         return terms[0] if len(terms) == 1 else self._node(meta, "add", *terms)
 
-    def mul(self, meta: Meta, items: list[Expr]) -> Expr:
-        return items[0] if len(items) == 1 else self._node(meta, "mul", *items)
+    def mul(self, meta: Meta, items: list[Any]) -> Expr:
+        """A product; ``a b / c d`` is read from left to right."""
+        factors: list[Expr] = []
+        after_slash = False
+        for item in items:
+            if isinstance(item, Token):
+                self._check_slash(factors[-1])
+                after_slash = True
+                continue
+            if after_slash:
+                above = factors[0] if len(factors) == 1 else self._span("mul", factors)
+                factors, after_slash = [self._span("frac", [above, item])], False
+            else:
+                factors.append(item)
+        return factors[0] if len(factors) == 1 else self._node(meta, "mul", *factors)
+
+    @staticmethod
+    def _span(op: str, args: list[Expr]) -> Expr:
+        return Expr(op, tuple(args), None, (args[0].span[0], args[-1].span[1]))
+
+    def _check_slash(self, before: Expr) -> None:
+        call = before.args[0] if before.op == "pow" else before
+        if call.op == "call" and call.args[0].span[1] == before.span[1]:
+            self.complain(
+                before.span[0], f"\\{call.value} ... / ... may mean two things: write parentheses, or \\frac{{...}}{{...}}"
+            )
 
     def cross(self, meta: Meta, items: list[Any]) -> Expr:
         return self._node(meta, "cross", items[0], items[2])
@@ -385,8 +442,9 @@ def _explain(token: Token) -> str:
     if token.type == "UNKNOWN_COMMAND":
         return f"unknown LaTeX command {token}"
     if token.type == "UNKNOWN_CHARACTER":
-        hint = "; write \\frac{...}{...}" if token == "/" else ""
-        return f"unexpected character {str(token)!r}{hint}"
+        return f"unexpected character {str(token)!r}"
+    if token.type == "SLASH":
+        return "unexpected '/'; an exponent is an integer here, and a root is \\sqrt{...}"
     return f"unexpected {str(token)!r}"
 
 

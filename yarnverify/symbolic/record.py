@@ -79,7 +79,7 @@ def _claim(judged: Judged, trial: Trial, repairs: dict[int, Repair | None]) -> d
     finding, claim = judged.finding, judged.claim
     line, column = trial.document.source.place(claim.relation.offset)
     repair = None
-    if finding.verdict is Verdict.REFUTED and not judged.because:
+    if finding.verdict is Verdict.REFUTED and finding.mendable and not judged.because:
         if id(claim.relation) not in repairs:
             repairs[id(claim.relation)] = _repair(judged)
         repair = repairs[id(claim.relation)]
@@ -95,7 +95,7 @@ def _claim(judged: Judged, trial: Trial, repairs: dict[int, Repair | None]) -> d
         "line": line,
         "column": column,
         "printed": chain_latex(claim.relation.members),
-        "correction": chain_latex(repair.members) if repair else _derived(judged) if refuted else None,
+        "correction": chain_latex(repair.members) if repair else _derived(judged) if refuted and finding.mendable else None,
         "change": describe(repair) if repair else None,
         "edit": {"kind": repair.change, "before": latex(repair.before), "after": latex(repair.after)}
         if repair

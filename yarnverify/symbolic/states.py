@@ -114,11 +114,12 @@ class StateMaker:
     def _admissible(self, state: dict[Name, Any]) -> bool:
         try:
             evaluation = Evaluation(self.section, state, Rationals(0))
-            return all(_holds(evaluation, assumption) for assumption in self.section.assumptions)
+            return all(holds(evaluation, assumption) for assumption in self.section.assumptions)
         except UndefinedError:
             return False
 
 
-def _holds(evaluation: Evaluation, assumption: Assumption) -> bool:
+def holds(evaluation: Evaluation, assumption: Assumption) -> bool:
+    """Whether an assumption is met at a state."""
     difference = evaluation.value(assumption.left) - evaluation.value(assumption.right)
     return evaluation.numbers.positive(difference) or (not assumption.strict and difference == 0)
