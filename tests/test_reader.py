@@ -367,7 +367,10 @@ def test_the_printed_zero_and_one_are_numbers() -> None:
         (r"\bigl\| \mathbf{x}_1 \bigr\|", r"\|\mathbf{x}_1\|"),
         (r"\biggl| u_1 \biggr|", r"|u_1|"),
         (r"1/2 k u_1^2", r"\frac{1}{2} k u_1^2"),
-        (r"k (\phi - \pi/2) / (l_1 \sin \phi) \mathbf{d}_1", r"\frac{k (\phi - \frac{\pi}{2})}{l_1 \sin \phi} \mathbf{d}_1"),
+        (
+            r"k (\phi - \pi/2) / (l_1 \sin \phi) \mathbf{d}_1",
+            r"\frac{k (\phi - \frac{\pi}{2})}{l_1 \sin \phi} \mathbf{d}_1",
+        ),
         (r"a / b / c", r"\frac{\frac{a}{b}}{c}"),
         (r"\sin(\theta) / 2", r"\frac{\sin(\theta)}{2}"),
     ],

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 
-from yarnverify.library import Shelf
+from yarnverify.library import Shelf, shelf_for
 from yarnverify.source import Source
 from yarnverify.symbolic.court import Court, Verdict
 from yarnverify.symbolic.declare import Declarations
@@ -20,6 +23,9 @@ BLOCKS = {
     "F_u1": r"F_{u_1}",
     "F_u0": r"F_{u_0}",
     "dF_x1/dx1": r"\frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial \mathbf{x}_1}",
+    "dF_x1/dx2": r"\frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial \mathbf{x}_2}",
+    "dF_u0/du0": r"\frac{\partial F_{u_0}}{\partial u_0}",
+    "dF_u1/du1": r"\frac{\partial F_{u_1}}{\partial u_1}",
     "dF_u1/dx1": r"\frac{\partial F_{u_1}}{\partial \mathbf{x}_1}",
 }
 MANY = None
@@ -84,6 +90,21 @@ BEND = r"\frac{2 k_b \theta}{l_1 (u_1 - u_2) \sin \theta}"
         ("Parallel Contact", "F_u0", r"k_c d (\Delta u - d)", "symbol"),
         ("Parallel Contact", "F_u0", r"k_c L (\Delta u + d)", "sign"),
         ("Parallel Contact", "F_u0", r"L (\Delta u - d)", "missing factor"),
+        ("Parallel Contact", "dF_u0/du0", "-k_c", "missing factor"),
+        ("Parallel Contact", "dF_u0/du0", "-L", "missing factor"),
+        ("Parallel Contact", "dF_u0/du0", "L", MANY),
+        ("Bending", "F_u1", r"\frac{k_b \theta^2}{u_1 - u_2}", "power"),
+        ("Bending", "dF_u1/du1", r"-\frac{2 k_b \theta^2}{u_1 - u_2}", "power"),
+        ("Bending", "F_u0", r"\frac{k_b \theta^2}{(u_1 - u_2)^2}", "zero"),
+        ("Shear", "F_x1", r"\frac{k_x L}{l_1 \sin \phi} \mathbf{P}_1 \mathbf{d}_3", MANY),
+        (
+            "Bending",
+            "dF_x1/dx2",
+            r"-\frac{2 k_b}{l_2 l_1 (u_1 - u_2) \sin \theta} \left(\left(\mathbf{P}_1 - \frac{\cos \theta}{\sin^2 \theta}"
+            r" \mathbf{P}_1 \mathbf{d}_2 \mathbf{d}_1^T \right) + \frac{1}{\sin \theta} \mathbf{P}_1 \mathbf{d}_2 \mathbf{d}_1^T \right)"
+            r" \mathbf{P}_2",
+            "missing factor",
+        ),
     ],
 )
 def test_a_planted_mistake_is_mended(
@@ -172,3 +193,33 @@ $$\|\mathbf{x}_1 - \mathbf{x}_0\|^2 = k^3 L \quad (4)$$
         expanded = [s for s in section.undefined(derived) if s.base not in "ldP"]
         assert not expanded  # written with the length, direction and projection of the segment
         assert court.judge(block, block).verdict is Verdict.PROVED
+
+
+@pytest.mark.parametrize(
+    ("equation", "old", "new", "change"),
+    [
+        ("3", r"\|u_i - u_0\|", "(u_i - u_0)", r"missing norm: u_i - u_0 should be \|u_i - u_0\|"),
+        (
+            "32",
+            r"\right)^2",
+            r"\right)",
+            r"power: \phi - \frac{\pi}{2} should be \left( \phi - \frac{\pi}{2} \right)^2",
+        ),
+        ("42", r"- d)^2", r"+ d)^2", "sign of d"),
+        ("44", "-k_c L", "-k_c", "missing factor: k_c should be L k_c"),
+        ("17", "F_{u_0} = 0", r"F_{u_0} = \frac{k_b \theta^2}{(u_1 - u_2)^2}", "zero: "),
+    ],
+)
+def test_a_misprint_of_the_paper_is_mended_where_it_is(
+    source: Source, equation: str, old: str, new: str, change: str
+) -> None:
+    display = next(d for d in re.findall(r"\$\$.*?\$\$", source.text, re.DOTALL) if rf"\quad ({equation})$$" in d)
+    assert old in display
+    text = source.text.replace(display, display.replace(old, new, 1))
+    head, *sections = re.split(r"(?m)^(?=## )", text)
+    if int(equation) > 4:
+        text = head + next(s for s in sections if rf"\quad ({equation})$$" in s)
+    record = prove_source(Source("edition.md", text), shelf_for(Path("edition.md"), source.text))
+    changes = {c["change"] for c in record["claims"] if c["equation"] == equation and c["verdict"] == "refuted"}
+    assert len(changes) == 1
+    assert changes.pop().startswith(change)

@@ -270,7 +270,8 @@ class _Build(Transformer[Token, Any]):
         call = before.args[0] if before.op == "pow" else before
         if call.op == "call" and call.args[0].span[1] == before.span[1]:
             self.complain(
-                before.span[0], f"\\{call.value} ... / ... may mean two things: write parentheses, or \\frac{{...}}{{...}}"
+                before.span[0],
+                f"\\{call.value} ... / ... may mean two things: write parentheses, or \\frac{{...}}{{...}}",
             )
 
     def cross(self, meta: Meta, items: list[Any]) -> Expr:

@@ -95,7 +95,11 @@ def _claim(judged: Judged, trial: Trial, repairs: dict[int, Repair | None]) -> d
         "line": line,
         "column": column,
         "printed": chain_latex(claim.relation.members),
-        "correction": chain_latex(repair.members) if repair else _derived(judged) if refuted and finding.mendable else None,
+        "correction": chain_latex(repair.members)
+        if repair
+        else _derived(judged)
+        if refuted and finding.mendable
+        else None,
         "change": describe(repair) if repair else None,
         "edit": {"kind": repair.change, "before": latex(repair.before), "after": latex(repair.after)}
         if repair

@@ -1,7 +1,8 @@
 """The smallest single-term change that makes a refuted chain true.
 
 Every node of the printed chain is changed in every way of a fixed list, cheapest first: a symbol that nothing defines, a
-sign, a transpose, an index, a number, a power, a swapped function or symbol, a missing or an extra factor. A candidate must
+sign, a transpose, an index, a number, a power, a norm, a swapped function or symbol, a missing or an extra factor, the
+name of the block itself. A candidate must
 have the right shapes; one that is off in double precision at a random state is dropped; the first one that is PROVED, for
 every claim of its chain, is the repair.
 """
@@ -24,6 +25,7 @@ from yarnverify.symbolic.numbers import Floats, UndefinedError
 from yarnverify.symbolic.tree import ONE, PI, ZERO, Expr, Name, ShapeError, Type, number, rebuild
 
 Sides = list[tuple[Expr, Expr]]
+_NAME = 4  # cost of doubting a block's name, beyond any change of what it equals but a missing term
 _FLOAT_TOLERANCE = 1e-6  # sorts out candidates; whatever passes is proved exactly, or dropped
 
 
@@ -90,7 +92,7 @@ class Workshop:
 
     def _says_the_same(self, candidate: Candidate) -> bool:
         """Whether the chain still speaks of the blocks that it spoke of, and says something of them."""
-        blocks = [{block_of(member) for member in members} - {""} for members in (self.members, candidate.members)]
+        blocks = [{_block(member) for member in members} - {""} for members in (self.members, candidate.members)]
         renamed = candidate.change in ("index", "undefined symbol")  # the name of a block may itself be the mistake
         if len(blocks[0]) != len(blocks[1]) or (blocks[0] != blocks[1] and not renamed):
             return False
@@ -127,9 +129,10 @@ class Workshop:
         for index, member in enumerate(self.members):
             if index < self.fixed:
                 continue
-            aside = int(bool(block_of(member)))  # what is printed of a block is doubted before the block's own name
+            block = bool(_block(member))  # what is printed of a block is doubted before the block's own name
             for cost, change, before, after, tree in self._changes(member):
                 members = (*self.members[:index], tree, *self.members[index + 1 :])
+                aside = (_NAME if change == "index" else 1) if block else 0
                 yield Candidate(cost + aside, change, before, after, members)
             if index:
                 yield Candidate(4, "zero", member, ZERO, (*self.members[:index], ZERO, *self.members[index + 1 :]))
@@ -148,6 +151,8 @@ class Workshop:
             yield cost, change, before, after, after
         for index, arg in enumerate(tree.args):
             for cost, change, before, after, new in self._changes(arg):
+                first = tree.op == "add" and not index and change == "sign" and before is arg and arg.op != "neg"
+                cost += int(first)  # a sign between two terms is lost more easily than one before them is
                 args = (*tree.args[:index], new, *tree.args[index + 1 :])
                 yield cost, change, before, after, replace(tree, args=args)
 
@@ -172,9 +177,11 @@ class Workshop:
             for other in (node.value - 1, node.value + 1, node.value + 2, node.value - 2, -node.value):
                 after = node.args[0] if other == 1 else replace(node, value=other) if other else ONE
                 yield 2, "power", node, after
-        elif kind is Type.SCALAR and node.op not in {"number", "neg", "force", "energy", "derivative", "add", "mul"}:
+        elif kind is Type.SCALAR and node.op not in {"number", "neg", "force", "energy", "derivative", "mul"}:
             for exponent in (2, 3):
                 yield 2, "power", node, Expr("pow", (node,), exponent)
+        if kind is Type.SCALAR and node.op == "add":
+            yield 2, "missing norm", node, Expr("norm", (node,))
         if node.op == "call":
             for other_function in ("sin", "cos", "tan"):
                 if other_function != node.value and node.value != "arccos":
@@ -222,11 +229,15 @@ class Workshop:
         for value in (2, 3, 4) if node.op != "number" else ():
             yield 2, "missing factor", node, _times(number(value), node)
             yield 2, "missing factor", node, Expr("frac", (node, number(value)))
-        if node.op in {"number", "neg", "add", "force", "derivative", "energy"}:
+        if node.op in {"number", "neg", "force", "derivative", "energy"}:
             return
         for scalar in self._scalars:
             yield 4, "missing factor", node, _times(scalar, node)
+            if node.op == "add":
+                continue
             yield 4, "missing denominator", node, Expr("frac", (node, scalar))
+        if node.op == "add":
+            return
         for matrix in self._matrices if kind in (Type.VECTOR, Type.COVECTOR, Type.MATRIX) else ():
             before = _after(node, matrix) if kind is Type.COVECTOR else _times(matrix, node)
             yield 4, "missing factor", node, before
@@ -280,6 +291,14 @@ class Workshop:
     @cached_property
     def _matrices(self) -> list[Expr]:
         return [Expr("symbol", value=name) for name in self._vocabulary if self.section.lookup(name) is Type.MATRIX]
+
+
+def _block(member: Expr) -> str:
+    """Name of the block that a member is, up to its sign; a symbol is none, it may itself be what is wrong."""
+    inner = member
+    while inner.op == "neg":
+        inner = inner.args[0]
+    return block_of(member) if inner.op in {"force", "energy", "derivative"} else ""
 
 
 def _is_angle(section: Section, name: Name) -> bool:
