@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import Any, Literal, TypeAlias
 
@@ -151,6 +151,16 @@ def unpack(upper: Array, dof: int) -> Array:
     return full
 
 
+@cache
+def _square(dof: int) -> Array:
+    """Where each entry of a symmetric matrix stands in its packed upper triangle, (dof, dof)."""
+    places = np.zeros((dof, dof), int)
+    for at, (i, j) in enumerate(_upper(dof)):
+        places[i, j] = places[j, i] = at
+    return places
+
+
+@cache
 def _upper(dof: int) -> list[tuple[int, int]]:
     return [(i, j) for i in range(dof) for j in range(i, dof)]
 
@@ -257,16 +267,18 @@ class _Run:
             found = kernel.tape(0, self.wanted, self.dtype).run_one(inputs)
         except (ArithmeticError, ValueError):
             return False
-        targets = self._targets(slice(0, 1))
-        rest = found[len(targets) :]
+        sizes = {"E": 1, "G": self.dof, "H": self.dof * (self.dof + 1) // 2}
+        rest = found[sum(sizes[key] for key in self.wanted) :]
         margins = rest[: len(kernel.shapes[0].checks)]
-        if not all(1 / self.limit < m < self.limit for m in margins) or not all(
-            0 < c < math.inf for c in rest[len(margins) :]
-        ):
+        if not all(1 / self.limit < m < self.limit for m in margins):
             return False
-        for target, value in zip(targets, found, strict=False):
-            target[0] = value
-        self._mirror(slice(0, 1))
+        if not all(0 < c < math.inf for c in rest[len(margins) :]):
+            return False
+        at = 0
+        for key, array in zip(self.wanted, self.out, strict=True):
+            part = found[at : at + sizes[key]]
+            at += sizes[key]
+            array[..., 0] = part[0] if key == "E" else np.array(part)[_square(self.dof)] if array.ndim == 3 else part
         return True
 
     def _chunks(self) -> None:
