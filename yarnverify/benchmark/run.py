@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import platform
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ ROUNDS = 7
 LONG, LONG_ROUNDS = 1_000_000, 3  # a round at this size takes tens of seconds
 TUNED_AT = 100_000
 MOST_BYTES = 4 * 10**9
+MOST_SECONDS = 5.0  # a call; what would take longer is measured at smaller sizes alone
 BASELINES = ("jax", "lambdify")
 FLOOR = "memory floor"
 Advance = Callable[[str, int], None]
@@ -189,9 +191,12 @@ def _measure(
     for state in STATES:
         inputs = timed_states(energy, state, max(sizes))
         states[state] = []
+        pace: dict[str, float] = {}
         for n in sizes:
             few = min(rounds, LONG_ROUNDS) if n >= LONG else rounds
-            states[state].append(_timed(chosen, inputs.first(n), few, clock))
+            slow = {name: seconds * n for name, seconds in pace.items() if seconds * n > MOST_SECONDS}
+            states[state].append(_timed(chosen, inputs.first(n), few, clock, slow))
+            pace |= {name: ns[0] / 1e9 for name, ns in states[state][-1]["ns"].items()}
             advance(f"{energy.name}: {n} elements, {state}", steps)
     errors = errors_of(energy, chosen, points)
     advance(f"{energy.name}: errors", steps)
@@ -245,14 +250,21 @@ def _call(way: Way, inputs: Inputs) -> Callable[[], object]:
     return lambda: way.run(inputs.q, inputs.parameters)
 
 
-def _timed(ways: dict[str, Way], inputs: Inputs, rounds: int, clock: Clock) -> dict[str, Any]:
-    """Times at one batch size, in nanoseconds per element, and how many times as fast as each baseline."""
+def _timed(
+    ways: dict[str, Way], inputs: Inputs, rounds: int, clock: Clock, slow: Mapping[str, float] = MappingProxyType({})
+) -> dict[str, Any]:
+    """Times at one batch size, in nanoseconds per element, and how many times as fast as each baseline.
+
+    ``slow`` holds the seconds that a call would take of those that are too slow for this size.
+    """
     n = inputs.q.shape[1]
     left_out: dict[str, str] = {}
     calls: dict[str, Callable[[], object]] = {}
     for name, way in ways.items():
         needed = way.bytes_at(n)
-        if needed > MOST_BYTES:
+        if name in slow:
+            left_out[name] = f"would take {slow[name]:.0f} s a call, more than {MOST_SECONDS:.0f}"
+        elif needed > MOST_BYTES:
             left_out[name] = _too_large(needed)
         else:
             calls[name] = _call(way, inputs)

@@ -173,23 +173,27 @@ def speed_against_error(record: dict[str, Any], energy: str) -> Figure:
         Name of an energy.
     """
     found = record["energies"][energy]
-    entries = {entry["n"]: entry for entry in found["states"]["mixed"]}
-    entry = entries[shown_size(list(entries))]
+    sizes = [entry["n"] for entry in found["states"]["mixed"]]
+    size = shown_size(sizes)
+    times: dict[str, list[float]] = {}
+    for entry in sorted(found["states"]["mixed"], key=lambda entry: entry["n"]):
+        if entry["n"] <= size:  # who is too slow for that size is shown at the largest at which it was measured
+            times |= {name: ns for name, ns in entry["ns"].items() if name in found["contestants"]}
     easy = [state for state in found["errors"] if state == "mixed"]
     hard = [state for state in found["errors"] if state not in easy]
-    names = [name for name in found["contestants"] if name in entry["ns"]]
-    figure = Figure(figsize=(9.2, 4.6), layout="constrained")
+    names = list(times)
+    figure = Figure(figsize=(10, 5.6), layout="constrained")
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     for axes, states, title in ((left, easy, "ordinary states"), (right, hard, "hard states, the worst of")):
         _bands(axes, described=axes is left)
         axes.set_xscale("log")
-        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axes.xaxis.set_minor_locator(NullLocator())
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, at: f"{value:g}"))
         axes.set_title(f"{title}\n{', '.join(states)}", fontsize=8)
-        axes.set_xlabel(f"ns per element for energy, gradient and Hessian; {entry['n']} elements")
-    times = {name: entry["ns"][name] for name in names}
-    left.set_xlim(min(t[1] for t in times.values()) / 1.6, max(t[2] for t in times.values()) * 2.2)
+        axes.set_xlabel(f"ns per element for energy, gradient and Hessian; {size} elements")
+    low, high = min(t[1] for t in times.values()) / 2.5, max(t[2] for t in times.values()) * 1.8
+    left.set_xlim(low, high)
+    left.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 200 * low else (1,)))
     left.set_ylabel("worst error in units of $2^{-53}$")
     key = "filled, bold, dashed line: the Pareto front; italic: what else people use"
     figure.suptitle(f"{energy}: speed against error ({key})", fontsize=9)
@@ -247,21 +251,30 @@ def _names_beside(
 
     (left, bottom), (right, top) = axes.transAxes.transform([(0, 0), (1, 1)]) * scale
     points = {name: in_points(spot) for name, spot in spots.items()}
-    taken = [(x - 4, y - 4, x + 4, y + 4) for x, y in points.values()]
+    solid = [(x - 4, y - 4, x + 4, y + 4) for x, y in points.values()]  # what a line to a name must not cross
+    taken = list(solid)
     for ends in lines:
         (x0, x1), (y0, y1) = (sorted(part) for part in zip(*map(in_points, ends), strict=True))
         taken.append((x0 - 0.5, y0 - 0.5, x1 + 0.5, y1 + 0.5))
     for name in sorted(spots, key=lambda each: (-points[each][1], points[each][0])):
         x, y = points[name]
         wide, high = _LETTER * len(name), 8.0
-        middles = [
-            (x + dx * (7 + wide / 2), y + dy * (reach + 9.5 * (dx == 0)))
-            for reach in range(0, 150, 6)
-            for dx, dy in ((1, 1), (0, 1), (0, -1), (-1, 1), (1, -1), (-1, -1))
+        shifts = [(8.0 * i, 9.0 * j) for j in range(-10, 11) for i in range(-15, 16)]
+        shifts += [(side * (7 + wide / 2), dy) for side in (1, -1) for dy in (0.0, 3.0, -3.0)]
+        boxes = [
+            (x + dx - wide / 2, y + dy - high / 2, x + dx + wide / 2, y + dy + high / 2)
+            for dx, dy in sorted(shifts, key=lambda shift: _gap(shift, wide, high))
         ]
-        boxes = [(a - wide / 2, b - high / 2, a + wide / 2, b + high / 2) for a, b in middles]
-        inside = [box for box in boxes if left < box[0] and box[2] < right and bottom < box[1] and box[3] < top]
-        box = next((box for box in inside if not any(_overlap(box, other) for other in taken)), boxes[0])
+        own = (x - 4, y - 4, x + 4, y + 4)
+        free = [
+            box
+            for box in boxes
+            if left < box[0] and box[2] < right and bottom < box[1] and box[3] < top
+            and not any(_overlap(box, other) for other in taken)
+        ]  # fmt: skip
+        clear = [box for box in free if not any(_crosses((x, y), box, other) for other in solid if other != own)]
+        box = (clear or free or boxes)[0]
+        solid.append(box)
         taken.append(box)
         a, b = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
         colour = mark(name, list(spots)).colour
@@ -270,8 +283,20 @@ def _names_beside(
             name, spots[name], xytext=(a - x, b - y), textcoords="offset points", ha="center", va="center",
             fontsize=7.5, color="0.1", fontweight="bold" if name in best else "normal",
             fontstyle="italic" if contestants[name]["kind"] == "peer" else "normal",
-            arrowprops=lead if abs(b - y) > 12 else None,
+            arrowprops=lead if _gap((a - x, b - y), wide, high) > 9 else None,
         )  # fmt: skip
+
+
+def _gap(shift: tuple[float, float], wide: float, high: float) -> float:
+    """How far a spot is from the box of a name whose middle is shifted against it."""
+    return math.hypot(max(abs(shift[0]) - wide / 2, 0.0), max(abs(shift[1]) - high / 2, 0.0)) + 0.01 * abs(shift[0])
+
+
+def _crosses(spot: tuple[float, float], box: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    """Whether the line from a spot to the middle of a box crosses another box."""
+    a, b = (box[0] + box[2]) / 2 - spot[0], (box[1] + box[3]) / 2 - spot[1]
+    steps = (k / 32 for k in range(33) if math.hypot(a, b) * k / 32 > 9)  # spots may overlap each other
+    return any(other[0] < spot[0] + t * a < other[2] and other[1] < spot[1] + t * b < other[3] for t in steps)
 
 
 def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
