@@ -312,12 +312,17 @@ class _Run:
                 if choice.size and not choice.min() > 0:
                     other = ~(choice[0] > 0)
                     later.append(where.start + np.flatnonzero(other if odd is None else other & ~odd))
-            for at in _groups(later):
-                odd = self._second(at, work)
-                if odd is not None:
-                    strange.append(at[odd])
+                    if sum(at.size for at in later) > CHUNK // 2:  # enough for one call, and its results still in the cache
+                        strange += self._second_all(later, work)
+                        later.clear()
+            strange += self._second_all(later, work)
             for at in _groups(strange):
                 self._special(at)
+
+    def _second_all(self, later: list[Array], work: _Workspace) -> list[Array]:
+        """Evaluate elements in the second shape; those of them that need more care."""
+        odd = [(at, self._second(at, work)) for at in _groups(later)]
+        return [at[strange] for at, strange in odd if strange is not None]
 
     def _strange(self, margins: Array, targets: list[Array]) -> Array | None:
         """Elements that are not as tame as nearly all are; None if there are none."""
