@@ -316,7 +316,7 @@ def test_both_readings_agree_on_every_mutant(paper: Paper, equation: str) -> Non
                 assert not compared.seen, (kind, printed(members))
                 continue
             if compared.seen:
-                assert same == (compared.differs is None), (kind, printed(members))
+                assert same == (not compared.differs), (kind, printed(members))
             else:
                 assert not same and compared.lacks_value, (kind, printed(members))
 

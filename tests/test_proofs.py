@@ -203,8 +203,8 @@ TRUE, WRONG = read_formula(r"-k (l_1 - L) \mathbf{d}_1"), read_formula(r"k (l_1 
     [
         ("_equal_normal", True, WRONG, "equal as normal forms, different at an exact state"),
         ("_equal_normal", False, TRUE, "different as normal forms, equal at every exact state tried"),
-        ("_compare", _Comparison(3, None), WRONG, "different as normal forms, equal at every exact state tried"),
-        ("_compare", _Comparison(3, {}), TRUE, "equal as normal forms, different at an exact state"),
+        ("_compare", _Comparison(3), WRONG, "different as normal forms, equal at every exact state tried"),
+        ("_compare", _Comparison(3, ({},)), TRUE, "equal as normal forms, different at an exact state"),
     ],
 )
 def test_readings_that_contradict_each_other_are_inconsistent(

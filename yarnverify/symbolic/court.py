@@ -1,8 +1,9 @@
 """A verdict on every claim of a document.
 
-PROVED       the normal form of the difference is zero, and the second reading agrees at several exact states.
-REFUTED      at an exact rational state the two sides differ, certified by balls that do not meet; or the sides have
-             different shapes, or a symbol that nothing defines.
+PROVED       the normal form of the difference is zero, and the second reading agrees at several exact states, on either
+             side of every absolute value and root.
+REFUTED      at an exact rational state the two sides differ, certified by balls that do not meet; or what is printed has
+             no value there, and the true side has one; or the sides have different shapes, or a symbol that nothing defines.
 UNDECIDED    neither; the reason is given.
 INCONSISTENT the two readings contradict each other: a defect of this tool, never of the document.
 """
@@ -23,14 +24,18 @@ from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.forward import Evaluation, entries
 from yarnverify.symbolic.latex import name_latex
 from yarnverify.symbolic.normal import Field, Quotient
-from yarnverify.symbolic.numbers import Balls, Rationals, UndefinedError
+from yarnverify.symbolic.numbers import Balls, NoValueError, Rationals, UndefinedError
 from yarnverify.symbolic.reading import UnsupportedError, Value, map_value
+from yarnverify.symbolic.signs import Signature, in_floats, lie_of, side_of, sided
 from yarnverify.symbolic.states import StateMaker
 from yarnverify.symbolic.tree import FORCE, Expr, Name, is_zero
 
 EXACT_STATES = 3  # the second reading's; each is a proof of difference, or one more agreement
 _TRIES = 16 * EXACT_STATES  # states drawn in search of such at which both sides have a value
+_WIDE = 160  # states drawn in search of the other side of an absolute value or root
+_SIDES = 24  # states at which a claim is compared that has several sides
 _BALL_BITS = (128, 512, 2048, 8192, 32768)
+_FEW_BITS = _BALL_BITS[:2]
 
 
 class Verdict(StrEnum):
@@ -63,13 +68,13 @@ class Finding:
 class _Comparison:
     """How two sides compare at exact states.
 
-    ``seen`` counts the states at which both had a value; ``differs`` is one at which these were not equal;
-    ``lacks_value`` is one at which only the left side has a value, and why the right one has none.
+    ``seen`` counts the states at which both had a value; ``differs`` are those at which these were not equal;
+    ``lacks_value`` are those at which only the left side has a value, with the error of the right one.
     """
 
     seen: int
-    differs: dict[Name, Any] | None
-    lacks_value: tuple[dict[Name, Any], str] | None = None
+    differs: tuple[dict[Name, Any], ...] = ()
+    lacks_value: tuple[tuple[dict[Name, Any], UndefinedError], ...] = ()
 
 
 class Court:
@@ -168,22 +173,70 @@ class Court:
         """Components of both sides at one state."""
         return _paired(left, right, entries(evaluation.value(left)), entries(evaluation.value(right)))
 
-    def _compare(self, left: Expr, right: Expr) -> _Comparison:
-        """Compare two sides at exact states, until enough were seen at which both have a value."""
-        seen, lacks_value = 0, None
-        for evaluation in self.exact:
+    @cached_property
+    def wide(self) -> list[Evaluation]:
+        """Evaluations over rationals at states that are drawn from a wider range than those of ``exact``."""
+        states = islice(self.maker.states(seed=2, wide=True), _WIDE if self.exact else 0)
+        return [Evaluation(self.section, state, Rationals(seed), self.energy) for seed, state in enumerate(states)]
+
+    @cached_property
+    def _floats(self) -> list[Evaluation]:
+        return [in_floats(evaluation) for evaluation in (*self.exact, *self.wide)]
+
+    @cached_property
+    def _sides(self) -> dict[Expr, list[int]]:
+        return {}
+
+    @cached_property
+    def _lies(self) -> list[Signature]:
+        return [lie_of(evaluation) for evaluation in self._floats]
+
+    def _other_sides(self, left: Expr, right: Expr, hidden: bool) -> list[Evaluation]:
+        """States on different sides of the absolute values and roots of two trees; none where they have one side only.
+
+        With ``hidden``, also where nothing is seen to have sides: roots of squares have them as well.
+        """
+        blocks = any(node.op in {"force", "energy", "derivative"} for side in (left, right) for node in side.walk())
+        nodes = sided(self.section, (left, right, self.energy) if blocks else (left, right))
+        if not nodes and not hidden:
+            return []
+        for node in nodes:
+            if node not in self._sides:
+                self._sides[node] = [side_of(evaluation, node) for evaluation in self._floats]
+        sides = list(zip(*(self._sides[node] for node in nodes), strict=True)) or [()] * len(self._floats)
+        if not hidden and len(set(sides)) == 1 and not any(node.op == "sqrt" for node in nodes):
+            return []
+        chosen: dict[Any, Evaluation] = {}
+        for keys in (sides, zip(sides, self._lies, strict=True)):
+            for key, evaluation in zip(keys, (*self.exact, *self.wide), strict=True):
+                chosen.setdefault(key, evaluation)
+        return list({id(evaluation): evaluation for evaluation in chosen.values()}.values())[:_SIDES]
+
+    def _compare(self, left: Expr, right: Expr, others: Iterable[Evaluation] = ()) -> _Comparison:
+        """Compare two sides at exact states, until enough were seen at which both have a value, and at others."""
+        seen = 0
+        differs: list[dict[Name, Any]] = []
+        lacks_value: list[tuple[dict[Name, Any], UndefinedError]] = []
+
+        def look(evaluation: Evaluation) -> None:
+            nonlocal seen
             try:
                 pairs = self.sides(evaluation, left, right)
             except UndefinedError as error:
-                if lacks_value is None and not self._undefined_at(evaluation, left):
-                    lacks_value = dict(evaluation.state), str(error)
-                continue
+                if not self._undefined_at(evaluation, left):
+                    lacks_value.append((dict(evaluation.state), error))
+                return
             seen += 1
             if any(a != b for a, b in pairs):
-                return _Comparison(seen, dict(evaluation.state))
-            if seen == EXACT_STATES:
+                differs.append(dict(evaluation.state))
+
+        for evaluation in self.exact:
+            look(evaluation)
+            if seen == EXACT_STATES or differs:
                 break
-        return _Comparison(seen, None, lacks_value)
+        for evaluation in others:
+            look(evaluation)
+        return _Comparison(seen, tuple(differs), tuple(lacks_value))
 
     @staticmethod
     def _undefined_at(evaluation: Evaluation, expr: Expr) -> bool:
@@ -193,21 +246,44 @@ class Court:
             return True
         return False
 
-    def certify(self, state: dict[Name, Any], left: Expr, right: Expr) -> Witness | None:
-        """The witness at a state, if balls of some precision show that the sides differ there."""
+    def certify(
+        self, state: dict[Name, Any], left: Expr, right: Expr, precisions: Iterable[int] = _BALL_BITS
+    ) -> Witness | None:
+        """The witness at a state, if balls of some precision show that the sides differ there.
+
+        They also do where the left side has a value and the right one certainly has none.
+        """
         before = flint.ctx.prec
         try:
-            for bits in _BALL_BITS:
+            for bits in precisions:
                 flint.ctx.prec = bits
+                evaluation = Evaluation(self.section, state, Balls(), self.energy)
                 try:
-                    pairs = self.sides(Evaluation(self.section, state, Balls(), self.energy), left, right)
+                    pairs = self.sides(evaluation, left, right)
                 except UndefinedError:
+                    if self._lacks_value(evaluation, left, right):
+                        return Witness(state, (), ())
                     continue
                 if any(not a.overlaps(b) for a, b in pairs):
                     return Witness(state, tuple(a for a, _ in pairs), tuple(b for _, b in pairs))
         finally:
             flint.ctx.prec = before
         return None
+
+    @staticmethod
+    def _lacks_value(evaluation: Evaluation, left: Expr, right: Expr) -> bool:
+        try:
+            if not all(part.is_finite() for part in entries(evaluation.value(left))):
+                return False
+        except UndefinedError:
+            return False
+        try:
+            evaluation.value(right)
+        except NoValueError:
+            return True
+        except UndefinedError:
+            return False
+        return False
 
     # -- verdict
 
@@ -228,13 +304,20 @@ class Court:
         except ZeroDivisionError:
             equal = None  # a denominator is identically zero
         compared = self._compare(left, right)
-        state = compared.differs
-        if equal and state is None and compared.seen:
+        refuted = self._refuted(compared, left, right)
+        if refuted is None:
+            others = self._other_sides(left, right, hidden=equal is not True)
+            if others:
+                compared = self._compare(left, right, others)
+                refuted = self._refuted(compared, left, right)
+        if refuted is not None and not (equal and refuted.witness is not None and refuted.witness.right):
+            return refuted
+        if equal and not compared.differs and compared.seen:
             return Finding(Verdict.PROVED)
-        if not compared.seen and compared.lacks_value is not None:
-            at, why = compared.lacks_value
+        if not compared.seen and compared.lacks_value:
+            at, why = compared.lacks_value[0]
             return Finding(Verdict.REFUTED, f"what is printed has no value: {why}", Witness(at, (), ()))
-        if unsupported and state is None:
+        if unsupported and not compared.differs:
             states = f"the {compared.seen} exact states tried" if compared.seen else "no state, since none was found"
             return Finding(Verdict.UNDECIDED, f"{unsupported}; equal at {states}")
         if not compared.seen:
@@ -246,18 +329,30 @@ class Court:
             return Finding(
                 Verdict.INCONSISTENT, "a denominator is zero as a normal form, and has a value at an exact state"
             )
-        if state is None and self.field.root_count > 1:
+        if not compared.differs and self.field.root_count > 1:
             return Finding(
                 Verdict.UNDECIDED, "equal at every exact state tried, but the square roots could not be settled"
             )
-        if state is None:
+        if not compared.differs:
             return Finding(Verdict.INCONSISTENT, "different as normal forms, equal at every exact state tried")
-        witness = self.certify(state, left, right)
-        if witness is None:
-            return Finding(
-                Verdict.UNDECIDED, "the exact readings differ, but no ball arithmetic could tell the sides apart"
-            )
-        return Finding(Verdict.REFUTED, "", witness)
+        return Finding(
+            Verdict.UNDECIDED, "the exact readings differ, but no ball arithmetic could tell the sides apart"
+        )
+
+    def _refuted(self, compared: _Comparison, left: Expr, right: Expr) -> Finding | None:
+        """The refutation that balls certify at one of the states at which a comparison failed."""
+        trials = [*((state, _FEW_BITS) for state in compared.differs)]
+        trials += [(state, _BALL_BITS) for state in compared.differs[:1]]
+        for state, precisions in trials:
+            witness = self.certify(state, left, right, precisions)
+            if witness is not None and witness.right:
+                return Finding(Verdict.REFUTED, "", witness)
+        for state, why in compared.lacks_value:
+            witness = self.certify(state, left, right, _FEW_BITS) if isinstance(why, NoValueError) else None
+            if witness is not None:
+                reason = f"what is printed has no value: {why}" if not witness.right else ""
+                return Finding(Verdict.REFUTED, reason, witness)
+        return None
 
 
 def undefined_symbols(missing: tuple[Name, ...]) -> Finding:

@@ -177,8 +177,7 @@ class Evaluation:
             turned = [a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3] for i in range(3)]
             return np.array(turned, dtype=object).reshape(3, 1)
         if op == "abs" or (op == "norm" and not isinstance(first, np.ndarray)):
-            inner = Jet._lift(first).value
-            return first if self.numbers.positive(inner) else -first
+            return self._absolute(first)
         if op == "norm":
             squares = [part * part for part in first.reshape(-1)]
             return self._sqrt(squares[0] + squares[1] + squares[2])
@@ -187,6 +186,16 @@ class Evaluation:
         if op == "call":
             return self._arccos(first)
         raise AssertionError(f"no such operation: {op}")
+
+    def _absolute(self, value: Any) -> Any:
+        inner = Jet._lift(value).value
+        if self.numbers.positive(inner):
+            return value
+        if self.numbers.positive(-inner):
+            return -value
+        if isinstance(value, Jet) and value.first is not None:
+            raise UndefinedError("derivative of an absolute value where it is zero")
+        return abs(inner) if isinstance(self.numbers, Balls) else inner
 
     def _sqrt(self, value: Any) -> Any:
         root = self.numbers.sqrt(Jet._lift(value).value)

@@ -24,6 +24,10 @@ class UndefinedError(Exception):
     """The formula has no value at this state: a zero denominator, or the root of a negative number."""
 
 
+class NoValueError(UndefinedError):
+    """A root of what is negative or an angle of what is beyond 1: not only here, but wherever nearby, is there no value."""
+
+
 class Algebraic:
     """A number ``sum_k q_k r_k`` over products r_k of adjoined square roots; immutable, exact."""
 
@@ -103,7 +107,10 @@ class Algebraic:
 
 
 class Rationals:
-    """Exact arithmetic; square roots are adjoined, angles and pi are drawn."""
+    """Exact arithmetic; square roots are adjoined, angles and pi are drawn next to their true values.
+
+    Close to the truth, so that absolute values and roots of what holds angles go to the side that they truly go to.
+    """
 
     exact = True
 
@@ -112,10 +119,15 @@ class Rationals:
         self._roots: list[Number] = []
         self._angles: dict[Number, Number] = {}
         self._circles: dict[Number, tuple[Number, Number]] = {}
-        self.pi = self._rational()
+        self.pi = self._beside(flint.arb.pi())
 
-    def _rational(self) -> Number:
-        return flint.fmpq(self._draw.randrange(1, 10**6), self._draw.randrange(1, 10**6))
+    def _beside(self, value: Any) -> Number:
+        """A rational number beside a ball, over a drawn denominator."""
+        below = self._draw.randrange(10**6, 2 * 10**6)
+        if not value.is_finite():  # too close to where it has no value
+            return flint.fmpq(self._draw.randrange(1, 10**6), below)
+        whole = (value * below).mid().fmpq()
+        return flint.fmpq(int((whole + flint.fmpq(1, 2)).floor()), below)
 
     def constant(self, value: Given) -> Number:
         value = Fraction(value)
@@ -143,7 +155,7 @@ class Rationals:
         if root is not None:
             return root
         if not self.positive(value):
-            raise UndefinedError("square root of a negative number")
+            raise NoValueError("square root of a negative number")
         if value in self._roots:
             return Algebraic(self._roots, {1 << self._roots.index(value): flint.fmpq(1)})
         if len(self._roots) == _MOST_ROOTS:  # a number has 2^roots parts
@@ -161,13 +173,13 @@ class Rationals:
 
     def arccos(self, cosine: Number) -> Number:
         if self.positive(cosine * cosine - 1):
-            raise UndefinedError("arc cosine of a number above 1 or below -1")
+            raise NoValueError("arc cosine of a number above 1 or below -1")
         if cosine in (1, 0, -1):
             return self.pi * {1: 0, 0: flint.fmpq(1, 2), -1: 1}[int(cosine)]
         if -cosine in self._angles:
             return self.pi - self._angles[-cosine]
         if cosine not in self._angles:
-            self._angles[cosine] = self._rational()
+            self._angles[cosine] = self._beside(self._approximate(cosine).acos())
         return self._angles[cosine]
 
     def knows_angle(self, cosine: Number) -> bool:
@@ -177,7 +189,7 @@ class Rationals:
     def circle(self, angle: Number) -> tuple[Number, Number]:
         """A rational point of the unit circle, drawn for an angle that no arc cosine explains."""
         if angle not in self._circles:
-            t = self._rational()
+            t = self._beside((self._approximate(angle) / 2).tan())
             self._circles[angle] = 2 * t / (1 + t * t), (1 - t * t) / (1 + t * t)
         return self._circles[angle]
 
@@ -206,11 +218,13 @@ class Balls:
         return bool(value > 0)
 
     def sqrt(self, value: Number) -> Number:
+        if value < 0:
+            raise NoValueError("square root of a negative number")
         return value.sqrt()
 
     def arccos(self, cosine: Number) -> Number:
         if abs(cosine) > 1:
-            raise UndefinedError("arc cosine of a number above 1 or below -1")
+            raise NoValueError("arc cosine of a number above 1 or below -1")
         if abs(cosine) < 1:
             return cosine.acos()
         # the true cosine lies in the ball and in [-1, 1], since an angle is asked for
