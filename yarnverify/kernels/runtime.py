@@ -312,7 +312,9 @@ class _Run:
                 if choice.size and not choice.min() > 0:
                     other = ~(choice[0] > 0)
                     later.append(where.start + np.flatnonzero(other if odd is None else other & ~odd))
-                    if sum(at.size for at in later) > CHUNK // 2:  # enough for one call, and its results still in the cache
+                    if (
+                        sum(at.size for at in later) > CHUNK // 2
+                    ):  # enough for one call, and its results still in the cache
                         strange += self._second_all(later, work)
                         later.clear()
             strange += self._second_all(later, work)
