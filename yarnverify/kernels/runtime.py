@@ -402,8 +402,10 @@ class _Run:
         rows, values = self._scaled(rows, values, exponent)
         found = np.empty((len(self._targets(slice(0, 0))), elements.size), self.dtype)
         margins, choice = self._again(0, np.arange(elements.size), rows, values, found)
-        self._refuse(0, margins, reasons == "", reasons)
-        other = (reasons == "") & ~(choice[0] > 0) if choice.size else np.zeros(elements.size, bool)
+        other = ~(choice[0] > 0) if choice.size else np.zeros(elements.size, bool)
+        self._refuse(0, margins, other, reasons, only="energy")  # derivatives are the other shape's affair
+        self._refuse(0, margins, ~other, reasons)
+        other &= reasons == ""
         if other.any() and len(kernel.shapes) == 1:
             found[:, other] = 0
         elif other.any():
@@ -427,9 +429,10 @@ class _Run:
         found[:, picked] = part
         return margins, choice
 
-    def _refuse(self, shape: int, margins: Array, mine: Array, reasons: Array) -> None:
+    def _refuse(self, shape: int, margins: Array, mine: Array, reasons: Array, only: str = "") -> None:
+        """Give the reason of each margin that is not positive, of what is wanted or of ``only`` one kind."""
         for (needed_by, reason), margin in zip(self.kernel.shapes[shape].checks, margins, strict=True):
-            if needed_by == "energy" or self.wanted != "E":
+            if needed_by == "energy" or (self.wanted != "E" and not only):
                 reasons[mine & ~(margin > 0) & (reasons == "")] = reason
 
     # -- scale
