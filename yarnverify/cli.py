@@ -245,13 +245,16 @@ def report(
     *,
     out: Annotated[Path, Parameter(help="Folder for the pages and the records behind them.")] = Path("reports"),
     check: Annotated[bool, Parameter(negative="", help="Compare with the files instead of writing them.")] = False,
+    pictures: Annotated[
+        bool, Parameter(negative="", help="Draw the pictures of measured records (needs matplotlib).")
+    ] = False,
     json_file: Json = None,
 ) -> None:
-    """All of it, to reports/: verdicts, corrections, derivations and kernels, a page an energy."""
+    """All of it, to reports/: verdicts, corrections, derivations, kernels, and what was measured; a page an energy."""
     from yarnverify.reporting import build_report
 
     with progress("reporting") as advance:
-        outcome = build_report(out, check, advance)
+        outcome = build_report(out, check, advance, pictures)
     _finish(outcome, json_file)
 
 

@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from yarnverify.errors import InputError
+from yarnverify.errors import InputError, NotRunError
 from yarnverify.generation import Outcome, generate_kernels, settle_files
 from yarnverify.library import MAIN_DOCUMENT, derivations
 from yarnverify.show import mistake_lines, tally_lines
 from yarnverify.verdicts import verdicts
 
-MEASURED = ("accuracy",)  # records that commands of their own write
+MEASURED = ("accuracy", "benchmark")  # records that commands of their own write
+
+COMMANDS = {
+    "accuracy": "yarnverify accuracy --write",
+    "benchmark": "yarnverify benchmark --json reports/records/benchmark.json",
+}
 
 
-def build_report(out: Path, check: bool, advance: Callable[[str, int], None] = lambda label, total: None) -> Outcome:
+def build_report(
+    out: Path, check: bool, advance: Callable[[str, int], None] = lambda label, total: None, pictures: bool = False
+) -> Outcome:
     """Write the report into a folder, or compare it with what is there.
 
     Parameters
@@ -27,11 +35,13 @@ def build_report(out: Path, check: bool, advance: Callable[[str, int], None] = l
         Compare instead of writing.
     advance
         Called as each step is done.
+    pictures
+        Draw the pictures of measured records anew; the pages show those that are there.
 
     Raises
     ------
     InputError, NotRunError
-        For derivations that cannot be read or proved, and files that cannot be written.
+        For derivations that cannot be read or proved, pictures without matplotlib, and files that cannot be written.
     """
     from yarnverify.report.pages import pages
 
@@ -42,7 +52,11 @@ def build_report(out: Path, check: bool, advance: Callable[[str, int], None] = l
         f"records/{name}.json": json.dumps(record, indent=1, ensure_ascii=False) + "\n"
         for name, record in records.items()
     }
-    texts |= pages({name: json.loads(texts[f"records/{name}.json"]) for name in records} | _measured(out))
+    measured = _measured(out)
+    if pictures:
+        _draw(out / "pictures", measured, list(records["derivations"]), lines)
+    drawn = sorted(path.name for path in (out / "pictures").glob("*.png"))
+    texts |= pages({name: json.loads(texts[f"records/{name}.json"]) for name in records} | measured, drawn)
     there = {path.relative_to(out).as_posix() for pattern in ("*.md", "records/*.json") for path in out.glob(pattern)}
     there -= {f"records/{name}.json" for name in MEASURED}
     outcome = settle_files(out, texts, check, sorted(there - set(texts)), "yarnverify report")
@@ -50,6 +64,27 @@ def build_report(out: Path, check: bool, advance: Callable[[str, int], None] = l
     outcome.differs |= not expected
     outcome.record = {"tally": records["verdicts"]["tally"], "as_expected": expected, "files": sorted(texts)}
     return outcome
+
+
+def _draw(folder: Path, measured: dict[str, Any], energies: list[str], lines: list[str]) -> None:
+    """Pictures of error against angle and of speed against error, as SVG and PNG."""
+    try:
+        from yarnverify.report.pictures import error_against_angle, speed_against_error, write
+    except ImportError:
+        raise NotRunError("pictures need matplotlib: pip install 'yarnverify[view]'") from None
+
+    def curves(accuracy: dict[str, Any], energy: str) -> Any:
+        return error_against_angle(accuracy, energy)
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for energy in energies:
+        accuracy, benchmark = measured["accuracy"], measured["benchmark"]
+        if accuracy is not None and any(curve["energy"] == energy for curve in accuracy["curves"]):
+            write(partial(curves, accuracy, energy), folder / f"{energy}-error")
+            lines.append(f"pictures/{energy}-error: drawn")
+        if benchmark is not None and energy in benchmark["energies"]:
+            write(partial(speed_against_error, benchmark, energy), folder / f"{energy}-speed")
+            lines.append(f"pictures/{energy}-speed: drawn")
 
 
 def _measured(out: Path) -> dict[str, Any]:
@@ -60,7 +95,7 @@ def _measured(out: Path) -> dict[str, Any]:
         try:
             found[name] = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
         except ValueError as error:
-            raise InputError(f"{path}: {error}; yarnverify {name} --write makes it anew") from None
+            raise InputError(f"{path}: {error}; {COMMANDS[name]} makes it anew") from None
     return found
 
 

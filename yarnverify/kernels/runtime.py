@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import Any, Literal, TypeAlias
 
@@ -151,6 +151,16 @@ def unpack(upper: Array, dof: int) -> Array:
     return full
 
 
+@cache
+def _square(dof: int) -> Array:
+    """Where each entry of a symmetric matrix stands in its packed upper triangle, (dof, dof)."""
+    places = np.zeros((dof, dof), int)
+    for at, (i, j) in enumerate(_upper(dof)):
+        places[i, j] = places[j, i] = at
+    return places
+
+
+@cache
 def _upper(dof: int) -> list[tuple[int, int]]:
     return [(i, j) for i in range(dof) for j in range(i, dof)]
 
@@ -257,16 +267,18 @@ class _Run:
             found = kernel.tape(0, self.wanted, self.dtype).run_one(inputs)
         except (ArithmeticError, ValueError):
             return False
-        targets = self._targets(slice(0, 1))
-        rest = found[len(targets) :]
+        sizes = {"E": 1, "G": self.dof, "H": self.dof * (self.dof + 1) // 2}
+        rest = found[sum(sizes[key] for key in self.wanted) :]
         margins = rest[: len(kernel.shapes[0].checks)]
-        if not all(1 / self.limit < m < self.limit for m in margins) or not all(
-            0 < c < math.inf for c in rest[len(margins) :]
-        ):
+        if not all(1 / self.limit < m < self.limit for m in margins):
             return False
-        for target, value in zip(targets, found, strict=False):
-            target[0] = value
-        self._mirror(slice(0, 1))
+        if not all(0 < c < math.inf for c in rest[len(margins) :]):
+            return False
+        at = 0
+        for key, array in zip(self.wanted, self.out, strict=True):
+            part = found[at : at + sizes[key]]
+            at += sizes[key]
+            array[..., 0] = part[0] if key == "E" else np.array(part)[_square(self.dof)] if array.ndim == 3 else part
         return True
 
     def _chunks(self) -> None:
@@ -300,12 +312,19 @@ class _Run:
                 if choice.size and not choice.min() > 0:
                     other = ~(choice[0] > 0)
                     later.append(where.start + np.flatnonzero(other if odd is None else other & ~odd))
-            for at in _groups(later):
-                odd = self._second(at, work)
-                if odd is not None:
-                    strange.append(at[odd])
+                    if (
+                        sum(at.size for at in later) > CHUNK // 2
+                    ):  # enough for one call, and its results still in the cache
+                        strange += self._second_all(later, work)
+                        later.clear()
+            strange += self._second_all(later, work)
             for at in _groups(strange):
                 self._special(at)
+
+    def _second_all(self, later: list[Array], work: _Workspace) -> list[Array]:
+        """Evaluate elements in the second shape; those of them that need more care."""
+        odd = [(at, self._second(at, work)) for at in _groups(later)]
+        return [at[strange] for at, strange in odd if strange is not None]
 
     def _strange(self, margins: Array, targets: list[Array]) -> Array | None:
         """Elements that are not as tame as nearly all are; None if there are none."""
@@ -383,8 +402,10 @@ class _Run:
         rows, values = self._scaled(rows, values, exponent)
         found = np.empty((len(self._targets(slice(0, 0))), elements.size), self.dtype)
         margins, choice = self._again(0, np.arange(elements.size), rows, values, found)
-        self._refuse(0, margins, reasons == "", reasons)
-        other = (reasons == "") & ~(choice[0] > 0) if choice.size else np.zeros(elements.size, bool)
+        other = ~(choice[0] > 0) if choice.size else np.zeros(elements.size, bool)
+        self._refuse(0, margins, other, reasons, only="energy")  # derivatives are the other shape's affair
+        self._refuse(0, margins, ~other, reasons)
+        other &= reasons == ""
         if other.any() and len(kernel.shapes) == 1:
             found[:, other] = 0
         elif other.any():
@@ -408,9 +429,10 @@ class _Run:
         found[:, picked] = part
         return margins, choice
 
-    def _refuse(self, shape: int, margins: Array, mine: Array, reasons: Array) -> None:
+    def _refuse(self, shape: int, margins: Array, mine: Array, reasons: Array, only: str = "") -> None:
+        """Give the reason of each margin that is not positive, of what is wanted or of ``only`` one kind."""
         for (needed_by, reason), margin in zip(self.kernel.shapes[shape].checks, margins, strict=True):
-            if needed_by == "energy" or self.wanted != "E":
+            if needed_by == "energy" or (self.wanted != "E" and not only):
                 reasons[mine & ~(margin > 0) & (reasons == "")] = reason
 
     # -- scale

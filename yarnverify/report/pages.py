@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from yarnverify.report.accuracy import accuracy_table
+from yarnverify.report.benchmark import benchmark_table
 
 _TEMPLATES = Environment(
     loader=FileSystemLoader(Path(__file__).parent / "templates"),
@@ -18,13 +20,16 @@ _TEMPLATES = Environment(
 )
 
 
-def pages(records: dict[str, Any]) -> dict[str, str]:
+def pages(records: dict[str, Any], pictures: Sequence[str] = ()) -> dict[str, str]:
     """File name to text: an index, and a page an energy.
 
     Parameters
     ----------
     records
-        ``verdicts``, ``derivations`` and ``kernels``, as written to ``records/``.
+        ``verdicts``, ``derivations`` and ``kernels``, as written to ``records/``;
+        ``accuracy`` and ``benchmark`` where measured.
+    pictures
+        Names of the pictures that are in ``pictures/``.
     """
     found, derived = records["verdicts"], records["derivations"]
     texts = {
@@ -45,6 +50,8 @@ def pages(records: dict[str, Any]) -> dict[str, str]:
             completeness=next((part for part in found["completeness"] if part["section"] == section), None),
             kernels=records["kernels"].get(name, {}),
             accuracy=_accuracy(records.get("accuracy"), name),
+            benchmark=_benchmark(records.get("benchmark"), name),
+            pictures=pictures,
         )
     return dict(sorted(texts.items()))
 
@@ -55,6 +62,10 @@ def _accuracy(record: dict[str, Any] | None, energy: str) -> list[str]:
         return []
     kinds = sorted({cell["dtype"] for cell in record["cells"] if cell["energy"] == energy}, reverse=True)
     return [accuracy_table(record, energy, kind) for kind in kinds]
+
+
+def _benchmark(record: dict[str, Any] | None, energy: str) -> str:
+    return "" if record is None or energy not in record["energies"] else benchmark_table(record, energy)
 
 
 def _render(template: str, **values: Any) -> str:

@@ -135,7 +135,7 @@ def _curves(axes: Axes, curve: dict[str, Any], output: str, names: Sequence[str]
         ]
         if lost:
             shift = 2.2 ** (place - (len(names) - 1) / 2)
-            x, y = zip(*lost[::3], strict=True)
+            x, y = zip(*(lost[place % 3 :: 3] or lost), strict=True)
             axes.plot(
                 x, [h * shift for h in y], color=style.colour, linestyle="none", marker=style.marker,
                 markersize=3.5, markerfacecolor="white", markeredgewidth=0.8, zorder=3,

@@ -352,7 +352,7 @@ class Court:
 
     def _refuted(self, compared: _Comparison, left: Expr, right: Expr) -> Finding | None:
         """The refutation that balls certify at one of the states at which a comparison failed."""
-        trials = [*((state, _FEW_BITS) for state in compared.differs)]
+        trials: list[tuple[dict[Name, Any], tuple[int, ...]]] = [(state, _FEW_BITS) for state in compared.differs]
         trials += [(state, _BALL_BITS) for state in compared.differs[:1]]
         for state, precisions in trials:
             witness = self.certify(state, left, right, precisions)

@@ -29,9 +29,11 @@ def sided(section: Section, trees: Iterable[Expr]) -> list[Expr]:
                 meaning = section.meaning(node.name)
                 if meaning is not None:
                     visit(meaning)
-            elif node.op in {"abs", "sqrt"} or (node.op == "norm" and section.type_of(node.args[0]) is Type.SCALAR):
-                found.setdefault(node)
-            elif node.op == "call" and node.value == "arccos":
+            elif (
+                node.op in {"abs", "sqrt"}
+                or (node.op == "norm" and section.type_of(node.args[0]) is Type.SCALAR)
+                or (node.op == "call" and node.value == "arccos")
+            ):
                 found.setdefault(node)
 
     for tree in trees:
