@@ -35,7 +35,8 @@ def field(domain: str = "", positive: tuple[Name, ...] = ()) -> Field:
 
 def same(left: str, right: str, domain: str = "", positive: tuple[Name, ...] = ()) -> bool:
     reading = field(domain, positive)
-    a, b = (reading.value(read_formula(side)) for side in (left, right))
+    with reading.claim():
+        a, b = (reading.value(read_formula(side)) for side in (left, right))
     return bool((a - b).is_zero)
 
 
@@ -314,3 +315,22 @@ def test_a_definition_is_differentiated_through() -> None:
     assert court.judge(force(POINTS[2]), right).verdict is Verdict.PROVED
     jacobian = Expr("derivative", (force(POINTS[2]),), POINTS[1])
     assert court.judge(jacobian, read_formula(r"a \mathbf{I}")).verdict is Verdict.PROVED
+
+
+def test_a_printed_root_settles_signs_in_its_own_claim_alone() -> None:
+    reading = field()
+
+    def absolute_of_a() -> bool:
+        return bool((reading.value(read_formula("|a|")) - reading.value(read_formula("a"))).is_zero)
+
+    with reading.claim():
+        reading.value(read_formula(r"\sqrt{-b}"))
+        assert not (reading.value(read_formula("|b|")) - reading.value(read_formula("b"))).is_zero
+        reading.value(read_formula(r"\sqrt{a}"))
+        assert absolute_of_a()
+        with reading.claim(printed=False):
+            assert not absolute_of_a()
+        assert absolute_of_a()
+    assert not absolute_of_a()
+    with reading.claim():
+        assert not absolute_of_a()

@@ -101,8 +101,8 @@ BEND = r"\frac{2 k_b \theta}{l_1 (u_1 - u_2) \sin \theta}"
             "Bending",
             "dF_x1/dx2",
             r"-\frac{2 k_b}{l_2 l_1 (u_1 - u_2) \sin \theta} \left(\left(\mathbf{P}_1 - \frac{\cos \theta}{\sin^2 \theta}"
-            r" \mathbf{P}_1 \mathbf{d}_2 \mathbf{d}_1^T \right) + \frac{1}{\sin \theta} \mathbf{P}_1 \mathbf{d}_2 \mathbf{d}_1^T \right)"
-            r" \mathbf{P}_2",
+            r" \mathbf{P}_1 \mathbf{d}_2 \mathbf{d}_1^T \right)"
+            r" + \frac{1}{\sin \theta} \mathbf{P}_1 \mathbf{d}_2 \mathbf{d}_1^T \right) \mathbf{P}_2",
             "missing factor",
         ),
     ],

@@ -136,16 +136,18 @@ class Court:
     def block(self, expr: Expr) -> Value:
         """True normal form of a force, an energy or a derivative."""
         if expr not in self._blocks:
-            if expr.op == "energy":
-                found = self._energy_value
-            elif expr.op == "force":
-                found = map_value(self.field.gradient(self._energy_value, expr.name), lambda q: q * FORCE)
-            else:
-                inner = expr.args[0]
-                of = self.block(inner) if inner.op in {"force", "energy"} else self.field.value(inner)
-                found = self.field.gradient(of, expr.name)
-            self._blocks[expr] = found
+            with self.field.claim(printed=False):
+                self._blocks[expr] = self._find_block(expr)
         return self._blocks[expr]
+
+    def _find_block(self, expr: Expr) -> Value:
+        if expr.op == "energy":
+            return self._energy_value
+        if expr.op == "force":
+            return map_value(self.field.gradient(self._energy_value, expr.name), lambda q: q * FORCE)
+        inner = expr.args[0]
+        of = self.block(inner) if inner.op in {"force", "energy"} else self.field.value(inner)
+        return self.field.gradient(of, expr.name)
 
     def is_zero(self, block: Expr) -> bool | None:
         """Whether a true block is zero everywhere; None if nothing could tell."""
@@ -164,7 +166,8 @@ class Court:
         return self.field.value(expr, self.block)
 
     def _equal_normal(self, left: Expr, right: Expr) -> bool:
-        pairs = _paired(left, right, flat(self.normal(left)), flat(self.normal(right)))
+        with self.field.claim():
+            pairs = _paired(left, right, flat(self.normal(left)), flat(self.normal(right)))
         return all((p - q).is_zero for p, q in pairs)
 
     # -- second reading

@@ -17,7 +17,8 @@ identity holds whatever their values). A remainder that is not zero proves nothi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -151,6 +152,7 @@ class Field(Reading):
         self._rules: dict[str, Callable[[str, Name, int], Quotient]] = {}
         self._roots: dict[Poly, str] = {}
         self._not_negative: list[Poly] = []  # sums of squares, and 1 - c^2 of angles between directions
+        self._granted: list[Poly] | None = None  # what stands under the printed roots of the claim at hand
         self._signless = False
         self._factored: dict[Poly, tuple[Any, tuple[tuple[Poly, int], ...]]] = {}
         self._angles: list[tuple[Quotient, Quotient]] = []  # (cosine, angle)
@@ -271,7 +273,7 @@ class Field(Reading):
             odd = [self.ring.symbols[i].name for i, e in enumerate(poly.LM) if e % 2]
             if all(name in self._positive for name in odd):
                 return 1 if poly.LC > 0 else -1
-        for known in (*self._known_positive, *self._not_negative):
+        for known in (*self._known_positive, *self._not_negative, *(self._granted or ())):
             ratio = poly.LC / known.LC
             if poly == known * ratio:
                 return 1 if ratio > 0 else -1
@@ -313,12 +315,14 @@ class Field(Reading):
     def value(self, expr: Expr, blocks: Callable[[Expr], Value] | None = None) -> Value:
         """As in ``Reading``; notes what cannot be negative whatever is printed.
 
-        That a root is printed makes its radicand not negative in its own formula alone, so this is no such case.
+        That a root is printed makes its radicand not negative in its own claim alone: see ``claim``.
         """
         if expr.op == "norm":
             self.value(expr.args[0], blocks)  # may hold printed roots of its own
         before = len(self._roots)
         value = super().value(expr, blocks)
+        if expr.op == "sqrt" and self._granted is not None:
+            self._granted += [p for p in self._roots if (value * value).numerator == p]
         if expr.op == "norm":
             self._not_negative += [*self._roots][before:]
         elif expr.op == "call" and expr.value == "arccos" and self._between_directions(expr.args[0]):
@@ -327,6 +331,22 @@ class Field(Reading):
                 both = (1 - cosine * cosine, 1 - cosine, 1 + cosine)
                 self._not_negative += [q.numerator for q in both if q.numerator]
         return value
+
+    @contextmanager
+    def claim(self, printed: bool = True) -> Iterator[None]:
+        """Within it, what stands under a printed root is not negative; what it settles must not be kept beyond it.
+
+        With ``printed`` false that is suspended, for what other claims share.
+        """
+        before, self._granted = self._granted, [] if printed else None
+        try:
+            yield
+        finally:
+            self._granted = before
+
+    def symbol(self, name: Name) -> Value:
+        with self.claim(printed=False):
+            return super().symbol(name)
 
     def _between_directions(self, expr: Expr) -> bool:
         """Whether a cosine is a product of two vectors of length 1, up to its sign."""
