@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.test_kernels import state
-from yarnverify.kernels import VARIANTS, ElementError, bending
+from yarnverify.kernels import VARIANTS, ElementError, bending, stretch
 from yarnverify.kernels.compiled import source_of
 
 CASES = [  # one of each kind, since each takes seconds to compile
@@ -30,6 +30,23 @@ def test_same_bits(energy: str, variant: str, dtype: type) -> None:
     assert [a.tobytes() for a in plain] == [a.tobytes() for a in compiled]
 
 
+@pytest.mark.parametrize("function", ["evaluate", "packed", "energy", "gradient", "hessian"])
+def test_any_layout_in_memory_and_any_number_of_elements(function: str) -> None:
+    """Chunks, both shapes, strided and read-only inputs, strided outputs."""
+    pytest.importorskip("numba", reason="numba is not installed: the compiled engine was not run")
+    q, parameters = state("stretch", n=9000)
+    q[3:6, ::3] = q[0:3, ::3] + 0.1 * (q[3:6, ::3] - q[0:3, ::3])  # compressed, too
+    plain = getattr(stretch, function)(q, **parameters)
+    wide = np.repeat(q, 2, axis=1)[:, ::2]
+    wide.setflags(write=False)
+    arrays = plain if isinstance(plain, tuple) else (plain,)
+    out = [np.repeat(np.zeros_like(a), 2, axis=-1)[..., ::2] for a in arrays]
+    for given in ({"q": q}, {"q": wide}, {"q": q, "out": out}):
+        found = getattr(stretch, function)(**given, **parameters, engine="compiled", threads=2)
+        found = found if isinstance(found, list | tuple) else (found,)
+        assert [a.tobytes() for a in arrays] == [a.tobytes() for a in found]
+
+
 def test_bad_elements_are_named() -> None:
     pytest.importorskip("numba", reason="numba is not installed: the compiled engine was not run")
     q, parameters = state("bending")
@@ -42,6 +59,6 @@ def test_bad_elements_are_named() -> None:
 def test_the_loop_is_valid_python(variant: str) -> None:
     """Also where numba is not installed."""
     module = importlib.import_module(f"yarnverify.kernels.{variant}.shear")
-    text = source_of(module.KERNEL.tape(0, "EGH", np.float64))
+    text = source_of(module.KERNEL.tape(0, "EGH", np.float64), "C")
     compile(text, "loop.py", "exec")
     assert text.count("\n            v") == module.KERNEL.tape(0, "EGH", np.float64).operations + text.count(" = +")

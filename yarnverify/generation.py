@@ -11,7 +11,10 @@ from typing import Any
 from yarnverify.library import MAIN_DOCUMENT, derivations
 
 DEFAULT_VARIANT = "accurate"
-WRITTEN_BY_HAND = {"__init__.py", "compiled.py", "doubledouble.py", "geometry.py", "runtime.py", "tape.py"}
+WRITTEN_BY_HAND = {
+    "__init__.py", "batch.py", "compiled.py", "doubledouble.py", "geometry.py", "inputs.py", "runtime.py", "scaling.py",
+    "tape.py",
+}  # fmt: skip
 
 
 @dataclass

@@ -10,8 +10,8 @@
     bending.packed(q, k_b=...)              the same with the upper triangle only, for assembly
 
 The default variant is ``accurate``; the packages ``yarnverify.kernels.fast`` and so on hold the others, all with the same
-interface. Generated modules hold straight-line formulas over ``geometry`` (safe atoms); ``runtime`` runs them by way of
-``tape`` (chunks of NumPy calls), ``doubledouble`` or ``compiled`` (numba).
+interface. Generated modules hold straight-line formulas over ``geometry`` (safe atoms); ``batch`` runs them by way of ``tape``
+(chunks of NumPy calls), ``doubledouble`` or ``compiled`` (numba).
 """
 
 from yarnverify.kernels import bending, parallel_contact, shear, stretch

@@ -2,6 +2,9 @@
 
 The same operations on the same numbers in the same order, without fused multiply-add, so the same bits as NumPy for every
 variant but those that call arccos, sin and cos, whose last digits are the library's own.
+
+Elements go through a block of local memory whose rows lie at fixed distances. That is what lets the compiler see that no
+row overlaps another and turn the statements into vector instructions, which is worth a factor of three.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ import importlib.util
 import os
 import sys
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,29 +24,96 @@ from numpy.typing import NDArray
 from yarnverify.kernels.tape import Tape
 
 if TYPE_CHECKING:
-    from yarnverify.kernels.runtime import Kernel
+    from yarnverify.kernels.batch import Batch
 
 Array = NDArray[Any]
-_BLOCK = 256  # elements whose inputs and results stay in the cache together
+BLOCK = 64  # elements whose inputs and results stay in the cache together
 _INFIX = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
 _PREFIX = {"negative": "-", "positive": "+"}
 _CALLS = {"absolute": "abs", "sqrt": "sqrt", "arccos": "acos", "sin": "sin", "cos": "cos", "tan": "tan"}
 
 
-def source_of(tape: Tape) -> str:
-    """The loop over elements as text, scalar statements in the order of the tape."""
+def source_of(tape: Tape, layout: str) -> str:
+    """The loop over elements as text, scalar statements in the order of the tape.
+
+    Parameters
+    ----------
+    tape
+        What to do.
+    layout
+        ``C`` if all arrays lie in memory row by row without gaps, which is the faster; else ``A``.
+    """
+    given, found = tape.inputs * BLOCK, tape.outputs * BLOCK
+    body = "\n            ".join(_statements(tape))
+    return f"""from math import acos, cos, sin, sqrt, tan
+
+import numpy as np
+from numba import njit, types
+
+real = types.{tape.dtype}
+whole = types.int64
+index = types.uint64  # without the case of negative indices, which the compiler cannot turn into vector instructions
+inputs = types.Array(real, 2, "{layout}", readonly=True)
+outputs = types.Array(real, 3, "{layout}")
+
+
+@njit(nogil=True, error_model="numpy")
+def write(found, places, out, first, at, count):
+    for k in range(places.shape[0]):
+        source = found[places[k, 0] * {BLOCK}:]
+        if at.size:
+            row = out[places[k, 1], places[k, 2]]
+            for j in range(count):
+                row[at[j]] = source[j]
+        else:
+            row = out[places[k, 1], places[k, 2], first:]
+            for j in range(count):
+                row[j] = source[j]
+
+
+@njit(
+    [(inputs, real[:, ::1], whole, whole, index[::1], whole[:, ::1], outputs, whole[:, ::1], outputs, whole[:, ::1], outputs,
+      real[:, ::1])],
+    nogil=True, error_model="numpy", fastmath=False, cache=True,
+)
+def loop(q, values, first, number, at, places_e, energy, places_g, gradient, places_h, hessian, rest):
+    given = np.zeros({given}, real)
+    found = np.empty({found}, real)
+    rows, more = q.shape[0], values.shape[0]
+    for start in range(0, number, {BLOCK}):
+        count = min({BLOCK}, number - start)
+        now = at[start:]
+        for k in range(rows):
+            if at.size:
+                for j in range(count):
+                    given[k * {BLOCK} + j] = q[k, now[j]] + real(0)
+            else:
+                row = q[k, first + start:]
+                for j in range(count):
+                    given[k * {BLOCK} + j] = row[j] + real(0)
+        for k in range(more):
+            for j in range(count):
+                given[(rows + k) * {BLOCK} + j] = values[k, start + j]
+        for j in range({BLOCK}):
+            {body}
+        write(found, places_e, energy, first + start, now, count)
+        write(found, places_g, gradient, first + start, now, count)
+        write(found, places_h, hessian, first + start, now, count)
+        for k in range(rest.shape[0]):
+            for j in range(count):
+                rest[k, start + j] = found[({tape.outputs} - rest.shape[0] + k) * {BLOCK} + j]
+"""
+
+
+def _statements(tape: Tape) -> list[str]:
     outputs, scratch = tape.inputs, tape.inputs + tape.outputs
     constants = scratch + tape.scratch
     fresh = {i: f"x{i}" for i in range(tape.inputs)}
-    kind = "float32" if tape.dtype == np.float32 else ""
 
     def name(slot: int) -> str:
-        if slot >= constants:
-            value = repr(tape.constants[slot - constants])
-            return f"{kind}({value})" if kind else value
-        return fresh[slot]
+        return f"real({tape.constants[slot - constants]!r})" if slot >= constants else fresh[slot]
 
-    lines = [f"x{i} = given[{i}, j]" for i in range(tape.inputs)]
+    lines = [f"x{i} = given[{i * BLOCK} + j]" for i in range(tape.inputs)]
     for step, (operation, operands, result) in enumerate(tape.calls):
         values = [name(slot) for slot in operands]
         if operation in _INFIX:
@@ -57,29 +128,7 @@ def source_of(tape: Tape) -> str:
             text = f"{_CALLS[operation]}({values[0]})"
         fresh[result] = f"v{step}"
         lines.append(f"v{step} = {text}")
-    lines += [f"found[{i}, j] = {fresh[outputs + i]}" for i in range(tape.outputs)]
-    body = "\n            ".join(lines)
-    return f"""from math import acos, cos, sin, sqrt, tan
-
-import numpy as np
-from numba import float32, njit
-
-
-@njit(nogil=True, error_model="numpy", fastmath=False, cache=True)
-def loop(q, moves, out):
-    given = np.zeros(({tape.inputs}, {_BLOCK}), out.dtype)
-    found = np.empty(({tape.outputs}, {_BLOCK}), out.dtype)
-    for start in range(0, out.shape[1], {_BLOCK}):
-        count = min({_BLOCK}, out.shape[1] - start)
-        for k in range({tape.inputs}):
-            for j in range(count):
-                given[k, j] = q[k, (start + j) * moves[k]]
-        for j in range({_BLOCK}):
-            {body}
-        for k in range({tape.outputs}):
-            for j in range(count):
-                out[k, start + j] = found[k, j]
-"""
+    return lines + [f"found[{i * BLOCK} + j] = {fresh[outputs + i]}" for i in range(tape.outputs)]
 
 
 def _load(text: str) -> Callable[..., None]:
@@ -103,29 +152,69 @@ def _load(text: str) -> Callable[..., None]:
     return loop
 
 
-def evaluator(
-    kernel: Kernel, shape: int, wanted: str, dtype: Any, most: int
-) -> Callable[[list[Array], list[Any], list[Array]], Array]:
-    """A function that fills targets with the outputs of a shape, and gives what is left over as rows."""
-    tape = kernel.tape(shape, wanted, dtype)
-    key = ("compiled", shape, wanted, np.dtype(dtype))
-    if key not in kernel._tapes:
-        kernel._tapes[key] = _load(source_of(tape))
-    loop = kernel._tapes[key]
-    inputs, results = np.empty((tape.inputs, most), dtype), np.empty((tape.outputs, most), dtype)
+class Loops:
+    """The loops of a batch, one a shape; a ``Worker``."""
 
-    def run(rows: list[Array], values: list[Any], targets: list[Array]) -> Array:
-        m = rows[0].size
-        given, out = inputs[:, :m], results[:, :m]
-        moves = np.ones(tape.inputs, np.int64)
-        for i, value in enumerate((*rows, *values)):
-            if np.ndim(value) == 0:
-                given[i, :1], moves[i] = value, 0
-            else:
-                given[i] = value
-        loop(given, moves, out)
-        for target, row in zip(targets, out, strict=False):
-            target[:] = row
-        return out[len(targets) :]
+    def __init__(self, batch: Batch) -> None:
+        self._batch = batch
+        self._outputs = _outputs(batch)
+        self._layout = "C" if all(array.flags.c_contiguous for array in (batch.rows, *self._outputs)) else "A"
+        self._by_first = self._loop(0)
 
-    return run
+    @cached_property
+    def _by_second(self) -> Callable[..., None]:
+        return self._loop(1)
+
+    def _loop(self, shape: int) -> Callable[..., None]:
+        kernel, wanted, dtype = self._batch.kernel, self._batch.wanted, self._batch.dtype
+        key = (shape, wanted, dtype, self._layout)
+        if key not in kernel.loops:
+            kernel.loops[key] = _load(source_of(kernel.tape(shape, wanted, dtype), self._layout))
+        return kernel.loops[key]
+
+    def first(self, where: slice) -> tuple[Array, Array]:
+        shape = self._batch.kernel.shapes[0]
+        tape = self._batch.kernel.tape(0, self._batch.wanted, self._batch.dtype)
+        rest = self._run(self._by_first, tape, where, where.start, where.stop - where.start, np.empty(0, np.uint64))
+        return rest[: len(shape.checks)], rest[len(shape.checks) :]
+
+    def second(self, at: Array) -> Array:
+        tape = self._batch.kernel.tape(1, self._batch.wanted, self._batch.dtype)
+        return self._run(self._by_second, tape, at, 0, at.size, at.astype(np.uint64))
+
+    def _run(
+        self, loop: Callable[..., None], tape: Tape, where: slice | Array, first: int, number: int, at: Array
+    ) -> Array:
+        batch = self._batch
+        values = np.empty((len(batch.values), number), batch.dtype)
+        for row, value in zip(values, batch.values_at(where), strict=True):
+            row[:] = value
+        written = sum({"E": 1, "G": batch.dof, "H": batch.dof * (batch.dof + 1) // 2}[key] for key in batch.wanted)
+        rest = np.empty((tape.outputs - written, number), batch.dtype)
+        loop(batch.rows, values, first, number, at, *self._outputs, rest)
+        return rest
+
+
+def _outputs(batch: Batch) -> list[Array]:
+    """For energy, gradient and Hessian: which output goes to which places, and the array (rows, columns, n) of the places."""
+    dof = batch.dof
+    pairs = [(i, j) for i in range(dof) for j in range(i, dof)]
+    places: dict[str, list[tuple[int, int, int]]] = {"E": [(0, 0, 0)], "G": [(k, 0, k) for k in range(dof)]}
+    if batch.full:
+        places["H"] = [(k, *place) for k, (i, j) in enumerate(pairs) for place in sorted({(i, j), (j, i)})]
+    else:
+        places["H"] = [(k, 0, k) for k in range(len(pairs))]
+    found: list[Array] = []
+    arrays = dict(zip(batch.wanted, batch.out, strict=True))
+    before = 0
+    for key in "EGH":
+        if key not in arrays:
+            found += [np.empty((0, 3), np.int64), np.empty((0, 0, 0), batch.dtype)]
+            continue
+        array = arrays[key]
+        found += [
+            np.array([(before + k, i, j) for k, i, j in places[key]], np.int64),
+            array[np.newaxis, np.newaxis] if key == "E" else array if array.ndim == 3 else array[np.newaxis],
+        ]
+        before += {"E": 1, "G": dof, "H": len(pairs)}[key]
+    return found

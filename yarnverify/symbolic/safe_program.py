@@ -25,7 +25,9 @@ from yarnverify.symbolic.measures import Segment
 from yarnverify.symbolic.safe import Corner, Safe
 from yarnverify.symbolic.tree import Name
 
-_SMOOTH_UP_TO = sp.Rational(5, 8)  # cosine between the edges; beyond, the rows of the common point cancel
+# Cosines between the edges beyond which the rows of the common point cancel: by more than targets allow, or by more than
+# the condition of the problem explains.
+_SMOOTH_UP_TO = {"exact": sp.Rational(5, 8), "plain": sp.Rational(13, 16)}
 _PLAIN_DOWN_TO = sp.Rational(1, 2**16)  # sine; a plain cross product keeps some 37 of 53 bits there
 
 
@@ -54,7 +56,7 @@ def safe_program(energy: Energy, safe: Safe, exact: bool, shapes: tuple[Safe, ..
     checks += domain_checks(energy, reading)
     choice = active(energy, reading)
     if safe.corner is not None and safe.shape == "smooth" and not alone:
-        choice = _SMOOTH_UP_TO - _symbol(safe.corner.name("C"))
+        choice = _SMOOTH_UP_TO["exact" if exact else "plain"] - _symbol(safe.corner.name("C"))
     if safe.corner is not None and safe.shape == "polar":
         ends = "0 or pi" if alone else "0" if safe.corner.sign > 0 else "pi"
         text = f"{safe.corner.symbol} is {ends}, where the energy has no derivative"

@@ -10,10 +10,7 @@ Every function takes
     k_c : float or (n,) array, in N m^-2, not negative
     L : float or (n,) array, in m, not negative
     d : float or (n,) array, in m, not negative
-    errors : "raise", or "mask" for NaN where an element has no value
-    out : arrays to write the results to, of their shapes and dtype
-    threads : number of threads that share the chunks of a large batch
-    engine : "numpy", or "compiled" for one fused loop by numba (extra ``compiled``)
+    errors, out, threads, engine : as in runtime.Options
 
 and raises TypeError or ValueError for arrays of the wrong kind or shape and parameters out of range, and ElementError, which
 names the first element that has no value, and the reason.
@@ -22,7 +19,7 @@ names the first element that has no value, and the reason.
 from typing import Any
 
 from yarnverify.kernels import runtime
-from yarnverify.kernels.runtime import Array, ArrayLike
+from yarnverify.kernels.runtime import Array, ArrayLike, Options, Unpack
 
 VARIANT = "printed"
 DOFS = ("u0", "u1")
@@ -74,26 +71,26 @@ KERNEL = runtime.Kernel(
 )
 
 
-def energy(q: ArrayLike, *, k_c: ArrayLike, L: ArrayLike, d: ArrayLike, **options: Any) -> Array:
+def energy(q: ArrayLike, *, k_c: ArrayLike, L: ArrayLike, d: ArrayLike, **options: Unpack[Options]) -> Array:
     """Energy of each element: (n,), in J."""
     return runtime.energy(KERNEL, q, {"k_c": k_c, "L": L, "d": d}, **options)
 
 
-def gradient(q: ArrayLike, *, k_c: ArrayLike, L: ArrayLike, d: ArrayLike, **options: Any) -> Array:
+def gradient(q: ArrayLike, *, k_c: ArrayLike, L: ArrayLike, d: ArrayLike, **options: Unpack[Options]) -> Array:
     """Gradient, the negative of the force: (2, n), in J/m."""
     return runtime.gradient(KERNEL, q, {"k_c": k_c, "L": L, "d": d}, **options)
 
 
-def hessian(q: ArrayLike, *, k_c: ArrayLike, L: ArrayLike, d: ArrayLike, **options: Any) -> Array:
+def hessian(q: ArrayLike, *, k_c: ArrayLike, L: ArrayLike, d: ArrayLike, **options: Unpack[Options]) -> Array:
     """Hessian, exactly symmetric: (2, 2, n), in J/m^2."""
     return runtime.hessian(KERNEL, q, {"k_c": k_c, "L": L, "d": d}, **options)
 
 
-def evaluate(q: ArrayLike, *, k_c: ArrayLike, L: ArrayLike, d: ArrayLike, **options: Any) -> tuple[Array, Array, Array]:
+def evaluate(q: ArrayLike, *, k_c: ArrayLike, L: ArrayLike, d: ArrayLike, **options: Unpack[Options]) -> tuple[Array, Array, Array]:
     """Energy, gradient and Hessian at once: (n,), (2, n), (2, 2, n), in J, J/m and J/m^2."""
     return runtime.evaluate(KERNEL, q, {"k_c": k_c, "L": L, "d": d}, **options)
 
 
-def packed(q: ArrayLike, *, k_c: ArrayLike, L: ArrayLike, d: ArrayLike, **options: Any) -> tuple[Array, Array, Array]:
+def packed(q: ArrayLike, *, k_c: ArrayLike, L: ArrayLike, d: ArrayLike, **options: Unpack[Options]) -> tuple[Array, Array, Array]:
     """The same, of the Hessian the upper triangle row by row: (n,), (2, n), (3, n), in J, J/m and J/m^2."""
     return runtime.packed(KERNEL, q, {"k_c": k_c, "L": L, "d": d}, **options)

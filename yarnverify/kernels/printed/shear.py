@@ -9,10 +9,7 @@ Every function takes
     q : (9, n) array of float64, float32 or integers, in m; rows as in DOFS
     k_x : float or (n,) array, in N, not negative
     L : float or (n,) array, in m, not negative
-    errors : "raise", or "mask" for NaN where an element has no value
-    out : arrays to write the results to, of their shapes and dtype
-    threads : number of threads that share the chunks of a large batch
-    engine : "numpy", or "compiled" for one fused loop by numba (extra ``compiled``)
+    errors, out, threads, engine : as in runtime.Options
 
 and raises TypeError or ValueError for arrays of the wrong kind or shape and parameters out of range, and ElementError, which
 names the first element that has no value, and the reason.
@@ -22,7 +19,7 @@ from typing import Any
 
 from yarnverify.kernels import runtime
 from yarnverify.kernels.geometry import PI
-from yarnverify.kernels.runtime import Array, ArrayLike
+from yarnverify.kernels.runtime import Array, ArrayLike, Options, Unpack
 from yarnverify.kernels.tape import arccos, cos, sin, sqrt
 
 VARIANT = "printed"
@@ -261,26 +258,26 @@ KERNEL = runtime.Kernel(
 )
 
 
-def energy(q: ArrayLike, *, k_x: ArrayLike, L: ArrayLike, **options: Any) -> Array:
+def energy(q: ArrayLike, *, k_x: ArrayLike, L: ArrayLike, **options: Unpack[Options]) -> Array:
     """Energy of each element: (n,), in J."""
     return runtime.energy(KERNEL, q, {"k_x": k_x, "L": L}, **options)
 
 
-def gradient(q: ArrayLike, *, k_x: ArrayLike, L: ArrayLike, **options: Any) -> Array:
+def gradient(q: ArrayLike, *, k_x: ArrayLike, L: ArrayLike, **options: Unpack[Options]) -> Array:
     """Gradient, the negative of the force: (9, n), in J/m."""
     return runtime.gradient(KERNEL, q, {"k_x": k_x, "L": L}, **options)
 
 
-def hessian(q: ArrayLike, *, k_x: ArrayLike, L: ArrayLike, **options: Any) -> Array:
+def hessian(q: ArrayLike, *, k_x: ArrayLike, L: ArrayLike, **options: Unpack[Options]) -> Array:
     """Hessian, exactly symmetric: (9, 9, n), in J/m^2."""
     return runtime.hessian(KERNEL, q, {"k_x": k_x, "L": L}, **options)
 
 
-def evaluate(q: ArrayLike, *, k_x: ArrayLike, L: ArrayLike, **options: Any) -> tuple[Array, Array, Array]:
+def evaluate(q: ArrayLike, *, k_x: ArrayLike, L: ArrayLike, **options: Unpack[Options]) -> tuple[Array, Array, Array]:
     """Energy, gradient and Hessian at once: (n,), (9, n), (9, 9, n), in J, J/m and J/m^2."""
     return runtime.evaluate(KERNEL, q, {"k_x": k_x, "L": L}, **options)
 
 
-def packed(q: ArrayLike, *, k_x: ArrayLike, L: ArrayLike, **options: Any) -> tuple[Array, Array, Array]:
+def packed(q: ArrayLike, *, k_x: ArrayLike, L: ArrayLike, **options: Unpack[Options]) -> tuple[Array, Array, Array]:
     """The same, of the Hessian the upper triangle row by row: (n,), (9, n), (45, n), in J, J/m and J/m^2."""
     return runtime.packed(KERNEL, q, {"k_x": k_x, "L": L}, **options)

@@ -9,10 +9,7 @@ Every function takes
 
     q : (11, n) array of float64, float32 or integers, in m; rows as in DOFS
     k_b : float or (n,) array, in N m^2, not negative
-    errors : "raise", or "mask" for NaN where an element has no value
-    out : arrays to write the results to, of their shapes and dtype
-    threads : number of threads that share the chunks of a large batch
-    engine : "numpy", or "compiled" for one fused loop by numba (extra ``compiled``)
+    errors, out, threads, engine : as in runtime.Options
 
 and raises TypeError or ValueError for arrays of the wrong kind or shape and parameters out of range, and ElementError, which
 names the first element that has no value, and the reason.
@@ -22,7 +19,7 @@ from typing import Any
 
 from yarnverify.kernels import runtime
 from yarnverify.kernels.geometry import angle, closing, corner, dot, normal_of, scaled, turning
-from yarnverify.kernels.runtime import Array, ArrayLike
+from yarnverify.kernels.runtime import Array, ArrayLike, Options, Unpack
 
 VARIANT = "reference"
 DOFS = ("x0.x", "x0.y", "x0.z", "x1.x", "x1.y", "x1.z", "x2.x", "x2.y", "x2.z", "u1", "u2")
@@ -192,7 +189,7 @@ def _smooth(q: Any, p: Any) -> Any:
         (
             l_1, l_2, t0,
         ),
-        (5/8 - C_theta,),
+        (13/16 - C_theta,),
     )
 
 
@@ -441,26 +438,26 @@ KERNEL = runtime.Kernel(
 )
 
 
-def energy(q: ArrayLike, *, k_b: ArrayLike, **options: Any) -> Array:
+def energy(q: ArrayLike, *, k_b: ArrayLike, **options: Unpack[Options]) -> Array:
     """Energy of each element: (n,), in J."""
     return runtime.energy(KERNEL, q, {"k_b": k_b}, **options)
 
 
-def gradient(q: ArrayLike, *, k_b: ArrayLike, **options: Any) -> Array:
+def gradient(q: ArrayLike, *, k_b: ArrayLike, **options: Unpack[Options]) -> Array:
     """Gradient, the negative of the force: (11, n), in J/m."""
     return runtime.gradient(KERNEL, q, {"k_b": k_b}, **options)
 
 
-def hessian(q: ArrayLike, *, k_b: ArrayLike, **options: Any) -> Array:
+def hessian(q: ArrayLike, *, k_b: ArrayLike, **options: Unpack[Options]) -> Array:
     """Hessian, exactly symmetric: (11, 11, n), in J/m^2."""
     return runtime.hessian(KERNEL, q, {"k_b": k_b}, **options)
 
 
-def evaluate(q: ArrayLike, *, k_b: ArrayLike, **options: Any) -> tuple[Array, Array, Array]:
+def evaluate(q: ArrayLike, *, k_b: ArrayLike, **options: Unpack[Options]) -> tuple[Array, Array, Array]:
     """Energy, gradient and Hessian at once: (n,), (11, n), (11, 11, n), in J, J/m and J/m^2."""
     return runtime.evaluate(KERNEL, q, {"k_b": k_b}, **options)
 
 
-def packed(q: ArrayLike, *, k_b: ArrayLike, **options: Any) -> tuple[Array, Array, Array]:
+def packed(q: ArrayLike, *, k_b: ArrayLike, **options: Unpack[Options]) -> tuple[Array, Array, Array]:
     """The same, of the Hessian the upper triangle row by row: (n,), (11, n), (66, n), in J, J/m and J/m^2."""
     return runtime.packed(KERNEL, q, {"k_b": k_b}, **options)

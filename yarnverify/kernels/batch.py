@@ -1,0 +1,367 @@
+"""One call of a kernel, from checked inputs to outputs and named errors.
+
+Nearly all elements go through the first shape a chunk at a time; the few that need something else (the second shape, a
+scale far from 1, an error) are taken out by looking at the margins and are done on their own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache, cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from yarnverify.kernels.inputs import (
+    Array,
+    Engine,
+    Errors,
+    Out,
+    Values,
+    check_options,
+    complain,
+    outputs_of,
+    parameters_of,
+    rows_of,
+)
+from yarnverify.kernels.scaling import exponents, scaled, unscale
+
+if TYPE_CHECKING:
+    from yarnverify.kernels.runtime import Kernel
+
+CHUNK = 8192  # elements at a time, so that scratch memory stays in the cache
+
+# Lengths, sines and parameters within these powers of two can neither overflow nor underflow in any product that occurs.
+_MODERATE = {np.dtype(np.float64): 2.0**100, np.dtype(np.float32): 2.0**14}
+
+Where: TypeAlias = slice | Array
+_Evaluator: TypeAlias = Callable[[list[Array], list[Any], list[Array]], tuple[Array, Array]]
+
+
+class Worker(Protocol):
+    """What evaluates elements into the outputs of a batch; one a thread."""
+
+    def first(self, where: slice) -> tuple[Array, Array]:
+        """Evaluate a range by the first shape; its margins (checks, m) and choice (0 or 1, m)."""
+
+    def second(self, at: Array) -> Array:
+        """Evaluate chosen elements by the second shape; its margins."""
+
+
+class Batch:
+    """One call of a kernel: its checked inputs, its outputs, and the elements found bad so far."""
+
+    def __init__(
+        self,
+        kernel: Kernel,
+        wanted: str,
+        q: ArrayLike,
+        parameters: Values,
+        *,
+        full: bool = False,
+        errors: Errors = "raise",
+        out: Out = None,
+        threads: int = 1,
+        engine: Engine = "numpy",
+    ) -> None:
+        check_options(errors, threads, engine)
+        self.kernel, self.wanted, self.full, self.errors = kernel, wanted, full, errors
+        self.rows = rows_of(kernel, q)
+        self.dof, self.n = self.rows.shape
+        self.dtype = self.rows.dtype
+        self.values = parameters_of(kernel, parameters, self.n, self.dtype)
+        self.limit = _MODERATE[self.dtype]
+        self.watch = any(not _moderate(value, self.limit) for value in self.values)
+        self.threads, self.engine = threads, engine
+        dof, n = self.dof, self.n
+        shapes = {"E": (n,), "G": (dof, n), "H": (dof, dof, n) if full else (dof * (dof + 1) // 2, n)}
+        self.out = outputs_of(kernel, [shapes[key] for key in wanted], self.dtype, out)
+        self.reasons: dict[int, str] = {}
+
+    def results(self) -> list[Array]:
+        """The outputs, filled.
+
+        Raises
+        ------
+        ElementError
+            If an element has no value and errors are not masked.
+        """
+        if self.n:
+            with np.errstate(all="ignore"):  # whatever is not finite is found and named below
+                if self.n > 1 or not self._single():
+                    self._chunks()
+        if self.reasons:
+            elements = np.array(sorted(self.reasons))
+            if self.errors == "raise":
+                complain(self.kernel, elements, self.reasons)
+            for array in self.out:
+                array[..., elements] = np.nan
+        return self.out
+
+    # -- where results go
+
+    def targets(self, where: Where) -> list[Array]:
+        """A row for each output scalar, of a range of elements; copies for an array of indices."""
+        targets: list[Array] = []
+        for key, array in zip(self.wanted, self.out, strict=True):
+            if key == "E":
+                targets.append(array[where])
+            elif key == "H" and self.full:
+                targets += [array[i, j, where] for i, j in upper(self.dof)]
+            else:
+                targets += list(array[:, where])
+        return targets
+
+    def scatter(self, at: Array, part: Iterable[Any]) -> None:
+        """Write results of chosen elements, a row of ``part`` for each output scalar."""
+        for target, row in zip(self.targets(slice(None)), part, strict=True):
+            target[at] = row
+        self.mirror(at)
+
+    def mirror(self, where: Where) -> None:
+        """Copy the upper triangle of a full Hessian to the lower one."""
+        if self.full:
+            hessian = self.out[-1]
+            for i, j in upper(self.dof):
+                if i != j:
+                    hessian[j, i, where] = hessian[i, j, where]
+
+    def values_at(self, where: Where) -> list[Any]:
+        """The parameters of chosen elements, each 0-d or (m,)."""
+        return [value if np.ndim(value) == 0 else value[where] for value in self.values]
+
+    # -- a batch of one
+
+    def _single(self) -> bool:
+        """A batch of one in Python floats, which cost less than arrays of one element; False where it needs more care."""
+        kernel = self.kernel
+        plain = kernel.portable and kernel.numbers == "float" and self.dtype == np.float64
+        if not plain or self.watch or self.engine != "numpy":
+            return False
+        inputs = [float(v) + 0.0 for v in self.rows[:, 0]] + [float(np.reshape(v, -1)[0]) for v in self.values]
+        try:
+            found = kernel.tape(0, self.wanted, self.dtype).run_one(inputs)
+        except (ArithmeticError, ValueError):
+            return False
+        sizes = {"E": 1, "G": self.dof, "H": self.dof * (self.dof + 1) // 2}
+        rest = found[sum(sizes[key] for key in self.wanted) :]
+        margins = rest[: len(kernel.shapes[0].checks)]
+        if not all(1 / self.limit < m < self.limit for m in margins):
+            return False
+        if not all(0 < c < math.inf for c in rest[len(margins) :]):
+            return False
+        at = 0
+        for key, array in zip(self.wanted, self.out, strict=True):
+            part = found[at : at + sizes[key]]
+            at += sizes[key]
+            array[..., 0] = part[0] if key == "E" else np.array(part)[_square(self.dof)] if array.ndim == 3 else part
+        return True
+
+    # -- many
+
+    def _chunks(self) -> None:
+        starts = [*range(0, self.n, CHUNK), self.n]
+        ranges = [slice(a, b) for a, b in pairwise(starts)]
+        if self.threads == 1 or len(ranges) == 1:
+            self._some(ranges)
+            return
+        with ThreadPoolExecutor(self.threads) as pool:
+            shares = [ranges[i :: self.threads] for i in range(self.threads)]
+            for done in [pool.submit(self._some, share) for share in shares]:
+                done.result()
+
+    def _worker(self) -> Worker:
+        if self.engine == "compiled" and self.kernel.numbers == "float":
+            from yarnverify.kernels.compiled import Loops
+
+            return Loops(self)
+        return _Arrays(self, min(CHUNK, self.n))
+
+    def _some(self, ranges: list[slice]) -> None:
+        """The chunks of one thread: all in the first shape, then those of the second, then those that need care."""
+        with np.errstate(all="ignore"):  # per thread
+            worker = self._worker()
+            later: list[Array] = []
+            strange: list[Array] = []
+            for where in ranges:
+                margins, choice = worker.first(where)
+                odd = self._strange(margins, where)
+                if choice.size and not np.isfinite(choice).all():
+                    odd = ~np.isfinite(choice[0]) if odd is None else odd | ~np.isfinite(choice[0])
+                if odd is not None:
+                    strange.append(where.start + np.flatnonzero(odd))
+                if choice.size and not choice.min() > 0:
+                    other = ~(choice[0] > 0)
+                    later.append(where.start + np.flatnonzero(other if odd is None else other & ~odd))
+                    if sum(at.size for at in later) > CHUNK // 2:  # enough for one call, and still in the cache
+                        strange += self._second(later, worker)
+                        later.clear()
+            strange += self._second(later, worker)
+            for at in _groups(strange):
+                self._special(at)
+
+    def _second(self, later: list[Array], worker: Worker) -> list[Array]:
+        """Evaluate elements in the second shape, or set them to zero; those of them that need more care."""
+        found = []
+        for at in _groups(later):
+            if len(self.kernel.shapes) == 1:
+                self.scatter(at, [0.0] * len(self.targets(slice(0, 0))))
+                continue
+            odd = self._strange(worker.second(at), at)
+            if odd is not None:
+                found.append(at[odd])
+        return found
+
+    def _strange(self, margins: Array, where: Where) -> Array | None:
+        """Elements that are not as tame as nearly all are; None if there are none."""
+        low = 1 / self.limit
+        if self.watch or not margins.size:
+            targets = self.targets(where)
+            strange = ~np.isfinite(targets[0])
+            for target in targets[1:]:
+                strange |= ~np.isfinite(target)
+            strange |= ~((margins > low) & (margins < self.limit)).all(axis=0)
+            return np.asarray(strange) if strange.any() else None
+        if margins.min() > low and margins.max() < self.limit:
+            return None
+        return np.asarray(~((margins > low) & (margins < self.limit)).all(axis=0))
+
+    def evaluator(self, shape: int, scratch: Array) -> _Evaluator:
+        """A function that fills targets with the outputs of a shape by NumPy, and gives margins and choice as rows."""
+        kernel, checks = self.kernel, len(self.kernel.shapes[shape].checks)
+        if kernel.numbers == "double-double":
+            from yarnverify.kernels.doubledouble import evaluator
+
+            extra = evaluator(kernel.outputs(shape, self.wanted))
+        else:
+            tape = kernel.tape(shape, self.wanted, self.dtype)
+
+            def extra(rows: list[Array], values: list[Any], targets: list[Array]) -> Array:
+                rest = np.empty((tape.outputs - len(targets), rows[0].size), self.dtype)
+                tape.run([*rows, *values], [*targets, *rest], scratch[: tape.scratch, : rows[0].size])
+                return rest
+
+        def run(rows: list[Array], values: list[Any], targets: list[Array]) -> tuple[Array, Array]:
+            rest = extra(rows, values, targets)
+            return rest[:checks], rest[checks:]
+
+        return run
+
+    def scratch(self, most: int) -> Array:
+        """Memory for intermediate values of whatever shape."""
+        if self.kernel.numbers == "double-double":
+            return np.empty((0, 0))
+        tapes = [self.kernel.tape(shape, self.wanted, self.dtype) for shape in range(len(self.kernel.shapes))]
+        return np.empty((max(tape.scratch for tape in tapes), most), self.dtype)
+
+    # -- elements that need care
+
+    def _special(self, elements: Array) -> None:
+        """Evaluate a few elements again, at a scale near 1, or find out why they have no value."""
+        kernel = self.kernel
+        rows = self.rows.take(elements, axis=1) + 0.0
+        reasons = np.full(elements.size, "", dtype=object)
+        for label, row in zip(kernel.dofs, rows, strict=True):
+            for text, wrong in (("nan", np.isnan(row)), ("inf", row == np.inf), ("-inf", row == -np.inf)):
+                reasons[wrong & (reasons == "")] = f"{label} is {text}"
+        rows = np.where(np.isfinite(rows), rows, 0)
+        exponent = exponents(kernel, rows, self.limit)
+        rows, values = scaled(kernel, rows, self.values_at(elements), exponent)
+        found = np.empty((len(self.targets(slice(0, 0))), elements.size), self.dtype)
+        margins, choice = self._again(0, np.arange(elements.size), rows, values, found)
+        other = ~(choice[0] > 0) if choice.size else np.zeros(elements.size, bool)
+        self._refuse(0, margins, other, reasons, only="energy")  # derivatives are the other shape's affair
+        self._refuse(0, margins, ~other, reasons)
+        other &= reasons == ""
+        if other.any() and len(kernel.shapes) == 1:
+            found[:, other] = 0
+        elif other.any():
+            second, _ = self._again(1, np.flatnonzero(other), rows, values, found)
+            everywhere = np.ones((len(second), elements.size), self.dtype)
+            everywhere[:, other] = second
+            self._refuse(1, everywhere, other, reasons)
+        unscale(kernel, self.wanted, found, exponent)
+        bad = ~np.isfinite(found).all(axis=0) & (reasons == "")
+        reasons[bad] = f"the result is not finite: an intermediate value is outside the range of {self.dtype}"
+        self.scatter(elements, found)
+        self.reasons.update((int(elements[i]), str(reasons[i])) for i in np.flatnonzero(reasons != ""))
+
+    def _again(self, shape: int, picked: Any, rows: Array, values: list[Any], found: Array) -> tuple[Array, Array]:
+        """Evaluate chosen columns by a shape into ``found``."""
+        rows = rows[:, picked]
+        values = [value if np.ndim(value) == 0 else value[picked] for value in values]
+        part = np.empty((found.shape[0], rows.shape[1]), self.dtype)
+        run = self.evaluator(shape, self.scratch(rows.shape[1]))
+        margins, choice = run(list(rows), values, list(part))
+        found[:, picked] = part
+        return margins, choice
+
+    def _refuse(self, shape: int, margins: Array, mine: Array, reasons: Array, only: str = "") -> None:
+        """Give the reason of each margin that is not positive, of what is wanted or of ``only`` one kind."""
+        for (needed_by, reason), margin in zip(self.kernel.shapes[shape].checks, margins, strict=True):
+            if needed_by == "energy" or (self.wanted != "E" and not only):
+                reasons[mine & ~(margin > 0) & (reasons == "")] = reason
+
+
+class _Arrays:
+    """NumPy calls a chunk at a time; scratch memory is kept, since fresh memory costs more than the arithmetic on it."""
+
+    def __init__(self, batch: Batch, most: int) -> None:
+        self._batch, self._most = batch, most
+        self._inputs = np.empty((batch.dof, most), batch.dtype)
+        self._scratch = batch.scratch(most)
+        self._by_first = batch.evaluator(0, self._scratch)
+
+    @cached_property
+    def _by_second(self) -> _Evaluator:
+        return self._batch.evaluator(1, self._scratch)
+
+    @cached_property
+    def _part(self) -> Array:
+        """Results of the second shape, before they go where they belong."""
+        return np.empty((len(self._batch.targets(slice(0, 0))), self._most), self._batch.dtype)
+
+    def first(self, where: slice) -> tuple[Array, Array]:
+        batch = self._batch
+        rows = np.add(batch.rows[:, where], 0.0, out=self._inputs[:, : where.stop - where.start])  # -0.0 is 0.0
+        found = self._by_first(list(rows), batch.values_at(where), batch.targets(where))
+        batch.mirror(where)
+        return found
+
+    def second(self, at: Array) -> Array:
+        batch = self._batch
+        part = self._part[:, : at.size]
+        rows = list(batch.rows.take(at, axis=1) + 0.0)
+        margins, _ = self._by_second(rows, batch.values_at(at), list(part))
+        batch.scatter(at, part)
+        return margins
+
+
+@cache
+def upper(dof: int) -> list[tuple[int, int]]:
+    """Row and column of each entry of a packed upper triangle."""
+    return [(i, j) for i in range(dof) for j in range(i, dof)]
+
+
+@cache
+def _square(dof: int) -> Array:
+    """Where each entry of a symmetric matrix stands in its packed upper triangle, (dof, dof)."""
+    places = np.zeros((dof, dof), int)
+    for at, (i, j) in enumerate(upper(dof)):
+        places[i, j] = places[j, i] = at
+    return places
+
+
+def _groups(found: list[Array]) -> list[Array]:
+    """Indices in groups of at most a chunk."""
+    every = np.concatenate(found) if found else np.empty(0, int)
+    return [every[i : i + CHUNK] for i in range(0, every.size, CHUNK)]
+
+
+def _moderate(value: Any, limit: float) -> bool:
+    size = np.abs(value)
+    return bool(((size == 0) | ((size > 1 / limit) & (size < limit))).all())
