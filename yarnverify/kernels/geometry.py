@@ -7,6 +7,7 @@ The functions run on Python floats, on traced scalars (see ``tape``), in a numba
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from yarnverify.kernels.series import TURNING
@@ -83,48 +84,66 @@ def cross_exact(a: Vector, a_low: Vector, b: Vector, b_low: Vector) -> Vector:
     )
 
 
+def sum_exact(parts: Sequence[Any], low: Any) -> tuple[Any, Any]:
+    """A sum as rounded, and what rounding took together with ``low``."""
+    value = parts[0]
+    for part in parts[1:]:
+        value, error = two_sum(value, part)
+        low = low + error
+    return value, low
+
+
 def dot_exact(a: Vector, a_low: Vector, b: Vector, b_low: Vector) -> Any:
-    """Scalar product of two sums ``a + a_low``, good to the last digits whatever cancels."""
-    x, x_low = two_product(a[0], b[0])
-    y, y_low = two_product(a[1], b[1])
-    z, z_low = two_product(a[2], b[2])
-    partial, partial_low = two_sum(x, y)
-    total, total_low = two_sum(partial, z)
-    low = (x_low + y_low) + z_low + (dot(a, b_low) + dot(a_low, b))
-    return total + ((partial_low + total_low) + low)
+    """Scalar product of two sums ``a + a_low``, good to the last digits where it is above u^2 of its terms."""
+    products = [two_product(p, q) for p, q in zip((*a, *a, *a_low), (*b, *b_low, *b), strict=True)]
+    partial, partial_low = two_sum(products[0][0], products[1][0])
+    total, total_low = two_sum(partial, products[2][0])
+    lows = [low for _, low in products[:3]]
+    crossed = [high for high, _ in products[3:]]
+    tail = sum((low for _, low in products[4:]), products[3][1]) + dot(a_low, b_low)
+    value, rest = sum_exact([total, partial_low, total_low, *lows, *crossed], tail)
+    return value + rest
 
 
 # -- segments ---------------------------------------------------------------------------------------------------------
 
 
-def segment(tail: Vector, head: Vector) -> tuple[Any, Any, Vector]:
-    """Length, the digits below its last (none here), and direction of a segment."""
+def segment(tail: Vector, head: Vector) -> tuple[Any, Any, Any, Vector]:
+    """Length, two numbers of digits below its last (none here), and direction of a segment."""
     e = edge(tail, head)
     length = sqrt(dot(e, e))
-    return length, 0.0, scaled(e, 1 / length)
+    return length, 0.0, 0.0, scaled(e, 1 / length)
 
 
-def segment_exact(tail: Vector, head: Vector) -> tuple[Any, Any, Vector]:
-    """Length, the digits below its last, and direction of a segment."""
+def segment_exact(tail: Vector, head: Vector) -> tuple[Any, Any, Any, Vector]:
+    """Length, the digits below its last, those below these, and direction of a segment.
+
+    At rest a length is the same as a difference of sliding coordinates but for the rounding of the coordinates. The strain
+    is then found in the digits below the last, of which one number would leave it with none.
+    """
     e, low = edge_exact(tail, head)
     length = sqrt(dot(e, e))
     square, square_low = two_product(length, length)
-    x, x_low = two_product(e[0], e[0])
-    y, y_low = two_product(e[1], e[1])
-    z, z_low = two_product(e[2], e[2])
+    (x, x_low), (y, y_low), (z, z_low) = (two_product(p, p) for p in e)
+    (cx, cx_low), (cy, cy_low), (cz, cz_low) = (two_product(p, 2 * q) for p, q in zip(e, low, strict=True))
     partial, partial_low = two_sum(x, y)
     total, total_low = two_sum(partial, z)
-    rest = (total - square) + ((partial_low + total_low) - square_low) + ((x_low + y_low) + z_low) + 2 * dot(e, low)
+    parts = [total - square, partial_low, total_low, -square_low, x_low, y_low, z_low, cx, cy, cz]
+    rest, rest_low = sum_exact(parts, (cx_low + cy_low + cz_low) + dot(low, low))
     inverse = 1 / length
-    return length, 0.5 * (rest * inverse), scaled(e, inverse)
+    digits = 0.5 * (rest * inverse)  # (l + t)^2 = l^2 + rest, first as t = rest/(2 l), then with what that leaves
+    back, back_low = two_product(2 * length, digits)
+    left = ((rest - back) - back_low) + (rest_low - digits * digits)
+    return length, digits, 0.5 * (left * inverse), scaled(e, inverse)
 
 
 def total(low: Any, *terms: Any) -> Any:
-    """``low`` plus a sum of terms that may cancel, the rounding errors of the sum included."""
-    value = terms[0]
+    """``low`` plus a sum of terms that may cancel, the rounding errors of the sum and of their sum included."""
+    value, errors = terms[0], []
     for term in terms[1:]:
         value, error = two_sum(value, term)
-        low = low + error
+        errors.append(error)
+    value, low = sum_exact([value, *errors], low)
     return value + low
 
 
@@ -174,28 +193,20 @@ def normal_of(m: Vector) -> tuple[Vector, Any]:
     return (m[0] / length, m[1] / length, m[2] / length), length * size
 
 
-def closing(
-    end_a: Vector, end_b: Vector, length_a: Any, length_b: Any, d_a: Vector, d_b: Vector
-) -> tuple[Vector, Vector]:
-    """The third edge of a corner: ``v = da/la - db/lb``, and ``b = (end_a - end_b)/(la lb)``, which has the same length.
+def closing(origin: Vector, end_a: Vector, end_b: Vector) -> tuple[Vector, Vector]:
+    """The third edge of a corner: ``v = a/a^2 - b/b^2``, and ``c = (a - b)/(|a| |b|)``, which has the same length.
 
-    The difference ``v`` of two nearly equal vectors is written with the third edge, so that it keeps its digits
-    when a yarn is folded onto itself.
+    The difference ``v`` of what may be nearly equal is written with the third edge, so that it keeps its digits when a yarn
+    is folded onto itself; with the edges themselves, whose coordinates have fewer roundings than their directions.
     """
-    longer, shorter = maximum(length_a, length_b), -maximum(-length_a, -length_b)
-    wide, narrow = 1 / longer, 1 / shorter
-    b = scaled(edge(end_b, end_a), wide)
-    ends = length_a * wide, length_b * wide
-    both = (
-        ends[0] * d_a[0] + ends[1] * d_b[0],
-        ends[0] * d_a[1] + ends[1] * d_b[1],
-        ends[0] * d_a[2] + ends[1] * d_b[2],
-    )
-    order = length_b - length_a
-    short = select(order, d_a[0], d_b[0]), select(order, d_a[1], d_b[1]), select(order, d_a[2], d_b[2])
-    along = dot(b, both) * narrow
-    v = b[0] * wide - short[0] * along, b[1] * wide - short[1] * along, b[2] * wide - short[2] * along
-    return v, scaled(b, narrow)
+    a, b, c = edge(origin, end_a), edge(origin, end_b), edge(end_b, end_a)
+    square_a, square_b = dot(a, a), dot(b, b)
+    longer, shorter = maximum(square_a, square_b), -maximum(-square_a, -square_b)
+    order = square_b - square_a
+    short = select(order, a[0], b[0]), select(order, a[1], b[1]), select(order, a[2], b[2])
+    along = dot(c, (a[0] + b[0], a[1] + b[1], a[2] + b[2])) / shorter
+    v = (c[0] - short[0] * along) / longer, (c[1] - short[1] * along) / longer, (c[2] - short[2] * along) / longer
+    return v, scaled(c, 1 / sqrt(square_a * square_b))
 
 
 # -- angles -----------------------------------------------------------------------------------------------------------

@@ -79,12 +79,12 @@ def _symbol(name: Name) -> sp.Symbol:
     return given_symbols(name)[0]
 
 
-def _low(segment: Segment) -> sp.Symbol:
-    """The digits of a length below its last."""
-    return sp.Symbol(f"low_{segment.sub}", real=True)
+def _low(segment: Segment) -> tuple[sp.Symbol, sp.Symbol]:
+    """The digits of a length below its last, in two numbers."""
+    return sp.Symbol(f"low_{segment.sub}", real=True), sp.Symbol(f"lower_{segment.sub}", real=True)
 
 
-def _totals(energy: Energy, lengths: dict[sp.Symbol, sp.Symbol]) -> Callable[[Any], Any]:
+def _totals(energy: Energy, lengths: dict[sp.Symbol, tuple[sp.Symbol, sp.Symbol]]) -> Callable[[Any], Any]:
     """Sums of lengths, sliding coordinates and parameters, which may cancel, become calls of ``geometry.total``."""
     inputs = {sp.Symbol(identifier(p.name), real=True) for p in energy.parameters}
     inputs |= {symbol for n in energy.unknowns if not n.bold for symbol in row_symbols(n)}
@@ -102,8 +102,9 @@ def _totals(energy: Energy, lengths: dict[sp.Symbol, sp.Symbol]) -> Callable[[An
         terms = sorted(
             value.args, key=lambda term: (term.as_coeff_Mul()[1] not in lengths, str(term.as_coeff_Mul()[1]))
         )
-        low = sum((factor * lengths[s] for factor, s in (t.as_coeff_Mul() for t in terms) if s in lengths), sp.S.Zero)
-        return total(low, *terms)
+        measured = [(factor, lengths[s]) for factor, s in (term.as_coeff_Mul() for term in terms) if s in lengths]
+        digits = [factor * low for factor, (low, _) in measured]
+        return total(sum((factor * lower for factor, (_, lower) in measured), sp.S.Zero), *terms, *digits)
 
     return lambda value: value.replace(is_sum, call)
 
@@ -118,10 +119,9 @@ def _prologue(safe: Safe, exact: bool, used: set[str]) -> list[str]:
     suffix = "_exact" if exact else ""
     for measure in safe.lengths:
         s = measure.a
-        low = str(_low(s)) if str(_low(s)) in used else "_"
-        lines.append(
-            f"{_symbol(s.l.name)}, {low}, {identifier(s.d.name)} = segment{suffix}({s.tail.label}, {s.head.label})"
-        )
+        low, lower = (str(symbol) if str(symbol) in used else "_" for symbol in _low(s))
+        made = f"segment{suffix}({s.tail.label}, {s.head.label})"
+        lines.append(f"{_symbol(s.l.name)}, {low}, {lower}, {identifier(s.d.name)} = {made}")
         lines.append(_unpacked(s.d.name))
     return [*lines, *(_corner_lines(safe, corner, exact, used) if corner else [])]
 
@@ -160,5 +160,5 @@ def _corner_lines(safe: Safe, corner: Corner, exact: bool, used: set[str]) -> li
     theta = str(_symbol(corner.symbol))
     functions = {theta: "angle", atom("psi"): "deviation", atom("half"): "half_tangent"}
     lines += [f"{name} = {function}({atom('s')}, {cosine})" for name, function in functions.items() if name in used]
-    lines.append(f"{vector('v')}, {vector('k')} = closing({ends}, {l_a}, {l_b}, {d_a}, {d_b})")
+    lines.append(f"{vector('v')}, {vector('k')} = closing({a.tail.label}, {ends})")
     return [*lines, *(_unpacked(corner.name(base, bold=True)) for base in ("v", "k"))]
