@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
@@ -18,7 +18,6 @@ from yarnverify.errors import InputError
 from yarnverify.kernels import ElementError
 from yarnverify.strategies import Element
 from yarnverify.symbolic.declare import Energy
-from yarnverify.symbolic.tree import Name
 
 Array = NDArray[Any]
 Kind = Literal["error", "not finite", "warning", "refused", "accepted"]
@@ -69,33 +68,9 @@ class Judgement:
     worst: float
 
 
-_REST = 1e-16  # nearer to rest than this, relative to its size, an element is outside of what ``accurate`` is made for
-
-
 def limit_of(variant: str) -> Limit:
     """The limit of a variant, in the range that it is made for."""
     return LIMITS.get(variant, _PLAIN)
-
-
-def _limit_at(variant: str, energy: Energy, points: Points, true: Truth) -> Limit:
-    """The limit of a variant at a state: so near to rest that the deviation drowns in the errors of errors, as for ``fast``."""
-    if variant == "accurate" and true.has_derivatives[0] and 0 < _from_rest(energy.unknowns, points, true) < _REST:
-        return _PLAIN
-    return limit_of(variant)
-
-
-def _from_rest(unknowns: Sequence[Name], points: Points, true: Truth) -> float:
-    """Relative deviation from rest: the root of the energy over what the second derivatives make of the element's size."""
-    moved = np.zeros(points.q.shape[0])
-    first: dict[bool, Array] = {}  # differences to the first point and to the first sliding coordinate
-    at = 0
-    for name in unknowns:
-        rows = slice(at, at + 3 if name.bold else at + 1)
-        at = rows.stop
-        here = points.q[rows, 0]
-        moved[rows] = np.abs(here - first.setdefault(name.bold, here))
-    with np.errstate(all="ignore"):
-        return float(np.sqrt(2 * np.abs(true.energy[0]) / (moved @ np.abs(true.hessian[..., 0]) @ moved)))
 
 
 @cache
@@ -185,7 +160,7 @@ def _compare(
     variant: str, energy: Energy, points: Points, true: Truth, output: str, computed: Array
 ) -> tuple[list[Flaw], float]:
     """Flaws of one output, and its largest error as a multiple of its limit."""
-    limit = _limit_at(variant, energy, points, true)
+    limit = limit_of(variant)
     errors: Errors = measure(output, computed, true, energy.unknowns, str(computed.dtype))
     sizes = errors.normwise[:, 0]
     worst = float(np.nanmax(sizes, initial=0.0)) / limit.rounding

@@ -13,6 +13,7 @@ import hashlib
 import importlib.util
 import os
 import sys
+import threading
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 BLOCK = 64  # elements whose inputs and results stay in the cache together
+_MAKING = threading.Lock()  # threads that share a batch make its loop once
 _INFIX = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
 _PREFIX = {"negative": "-", "positive": "+"}
 _CALLS = {"absolute": "abs", "sqrt": "sqrt", "arccos": "acos", "sin": "sin", "cos": "cos", "tan": "tan"}
@@ -168,9 +170,10 @@ class Loops:
     def _loop(self, shape: int) -> Callable[..., None]:
         kernel, wanted, dtype = self._batch.kernel, self._batch.wanted, self._batch.dtype
         key = (shape, wanted, dtype, self._layout)
-        if key not in kernel.loops:
-            kernel.loops[key] = _load(source_of(kernel.tape(shape, wanted, dtype), self._layout))
-        return kernel.loops[key]
+        with _MAKING:
+            if key not in kernel.loops:
+                kernel.loops[key] = _load(source_of(kernel.tape(shape, wanted, dtype), self._layout))
+            return kernel.loops[key]
 
     def first(self, where: slice) -> tuple[Array, Array]:
         shape = self._batch.kernel.shapes[0]

@@ -108,14 +108,27 @@ def dot_exact(a: Vector, a_low: Vector, b: Vector, b_low: Vector) -> Any:
 # -- segments ---------------------------------------------------------------------------------------------------------
 
 
-def segment(tail: Vector, head: Vector) -> tuple[Any, Any, Any, Vector]:
-    """Length, two numbers of digits below its last (none here), and direction of a segment."""
+def segment(tail: Vector, head: Vector) -> tuple[Any, Vector]:
+    """Length and direction of a segment."""
     e = edge(tail, head)
     length = sqrt(dot(e, e))
-    return length, 0.0, 0.0, scaled(e, 1 / length)
+    return length, scaled(e, 1 / length)
 
 
-def segment_exact(tail: Vector, head: Vector) -> tuple[Any, Any, Any, Vector]:
+def segment_exact(tail: Vector, head: Vector) -> tuple[Any, Any, Vector]:
+    """Length, the digits below its last, and direction of a segment."""
+    e, low = edge_exact(tail, head)
+    length = sqrt(dot(e, e))
+    square, square_low = two_product(length, length)
+    (x, x_low), (y, y_low), (z, z_low) = (two_product(p, p) for p in e)
+    partial, partial_low = two_sum(x, y)
+    total, total_low = two_sum(partial, z)
+    rest = (total - square) + ((partial_low + total_low) - square_low) + ((x_low + y_low) + z_low) + 2 * dot(e, low)
+    inverse = 1 / length
+    return length, 0.5 * (rest * inverse), scaled(e, inverse)
+
+
+def segment_twice(tail: Vector, head: Vector) -> tuple[Any, Any, Any, Vector]:
     """Length, the digits below its last, those below these, and direction of a segment.
 
     At rest a length is the same as a difference of sliding coordinates but for the rounding of the coordinates. The strain
@@ -138,13 +151,36 @@ def segment_exact(tail: Vector, head: Vector) -> tuple[Any, Any, Any, Vector]:
 
 
 def total(low: Any, *terms: Any) -> Any:
-    """``low`` plus a sum of terms that may cancel, the rounding errors of the sum and of their sum included."""
+    """``low`` plus a sum of terms that may cancel, the rounding errors of the sum included."""
+    value = terms[0]
+    for term in terms[1:]:
+        value, error = two_sum(value, term)
+        low = low + error
+    return value + low
+
+
+def total_twice(low: Any, *terms: Any) -> Any:
+    """The same with the rounding errors of the sum of these errors, for what hardly more than rounding is left of."""
     value, errors = terms[0], []
     for term in terms[1:]:
         value, error = two_sum(value, term)
         errors.append(error)
     value, low = sum_exact([value, *errors], low)
     return value + low
+
+
+def in_order(*terms: Any) -> Any:
+    """A sum from left to right; for terms of one sign, in which nothing cancels."""
+    value = terms[0]
+    for term in terms[1:]:
+        value = value + term
+    return value
+
+
+def apart(difference: Any, length: Any) -> Any:
+    """Positive where a difference is more than a few roundings of a length."""
+    step = (length + difference / 8) - length
+    return step * step
 
 
 # -- corners: two edges from one point --------------------------------------------------------------------------------

@@ -379,8 +379,9 @@ LIBRARY = {"arccos", "sin", "cos", "tan"}  # not correctly rounded, so not the s
 _FUNCTIONS = {
     "tape": LIBRARY | {"power", "select", "sqrt"},
  "geometry": {
-        "PI", "angle", "closing", "corner", "corner_exact", "deviation", "dot", "half_tangent", "normal_of", "right_corner",
-        "right_corner_exact", "scaled", "segment", "segment_exact", "total", "turning", "versine",
+        "PI", "angle", "apart", "closing", "corner", "corner_exact", "deviation", "dot", "half_tangent", "in_order",
+        "normal_of", "right_corner", "right_corner_exact", "scaled", "segment", "segment_exact", "segment_twice", "total",
+        "total_twice", "turning", "versine",
     },
 }  # fmt: skip
 

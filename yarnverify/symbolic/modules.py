@@ -132,11 +132,18 @@ def derived_programs(energy: Energy, found: Proved, variant: str) -> tuple[list[
     if not found.shapes:
         note = "there is no safe form for this law; these are the differentiated formulas"
         return [derived_program(energy, found.derivation)], [note]
-    if variant == "fast" and found.shapes[-1].shape == "polar":
+    shapes = found.shapes
+    if variant == "fast" and shapes[-1].shape == "polar":
         # within rounding of a fold the plain cross product has no direction any more: there, and only there, the exact one
-        first = safe_program(energy, found.shapes[0], False, found.shapes, guarded=len(found.shapes) == 1)
-        return [first, safe_program(energy, found.shapes[-1], True, found.shapes)], []
-    return [safe_program(energy, shape, variant == "accurate", found.shapes) for shape in found.shapes], []
+        first = safe_program(energy, shapes[0], "plain", shapes, guarded=len(shapes) == 1)
+        return [first, safe_program(energy, shapes[-1], "exact", shapes)], []
+    if variant != "accurate":
+        return [safe_program(energy, shape, "plain", shapes) for shape in shapes], []
+    compares = any(m.b is None for m in shapes[0].derivation.measures)  # a length with what it is at rest
+    if shapes[0].corner is None and compares and energy.elsewhere != "zero":
+        first = safe_program(energy, shapes[0], "exact", shapes, guarded=True)
+        return [first] if first.choice is None else [first, safe_program(energy, shapes[0], "twice", shapes)], []
+    return [safe_program(energy, shape, "twice" if compares else "exact", shapes) for shape in shapes], []
 
 
 def _require_proofs(what: str, found: dict[str, Finding]) -> None:

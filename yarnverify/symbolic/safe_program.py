@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, Literal, TypeAlias
 
 import sympy as sp
 
@@ -25,25 +25,31 @@ from yarnverify.symbolic.measures import Segment
 from yarnverify.symbolic.safe import Corner, Safe
 from yarnverify.symbolic.tree import Name
 
+Digits: TypeAlias = Literal["plain", "exact", "twice"]
+
 # Cosines between the edges beyond which the rows of the common point cancel: by more than targets allow, or by more than
 # the condition of the problem explains.
 _SMOOTH_UP_TO = {"exact": sp.Rational(5, 8), "plain": sp.Rational(13, 16)}
 _PLAIN_DOWN_TO = sp.Rational(1, 2**16)  # sine; a plain cross product keeps some 37 of 53 bits there
 
 
-def safe_program(energy: Energy, safe: Safe, exact: bool, shapes: tuple[Safe, ...], guarded: bool = False) -> Program:
+def safe_program(
+    energy: Energy, safe: Safe, digits: Digits, shapes: tuple[Safe, ...], guarded: bool = False
+) -> Program:
     """The program of one shape.
 
     Parameters
     ----------
     energy, safe
         What is computed, and how.
-    exact
-        Whether rounding errors of edges, products and sums are carried along.
+    digits
+        Which rounding errors of edges, products and sums are carried along: none (``plain``), all (``exact``), or all and those
+        of their sums (``twice``).
     shapes
         All that the energy has.
     guarded
-        Whether small sines are left to another program.
+        Whether another program is there for what this one cannot do: small sines, or lengths within rounding of what they are
+        compared with.
     """
     alone = len(shapes) == 1
     formulas = {block: tree for first, rest in safe.blocks(1) for block, tree in (first, *rest)}
@@ -56,22 +62,25 @@ def safe_program(energy: Energy, safe: Safe, exact: bool, shapes: tuple[Safe, ..
     checks += domain_checks(energy, reading)
     choice = active(energy, reading)
     if safe.corner is not None and safe.shape == "smooth" and not alone:
-        choice = _SMOOTH_UP_TO["exact" if exact else "plain"] - _symbol(safe.corner.name("C"))
+        choice = _SMOOTH_UP_TO["plain" if digits == "plain" else "exact"] - _symbol(safe.corner.name("C"))
     if safe.corner is not None and safe.shape == "polar":
         ends = "0 or pi" if alone else "0" if safe.corner.sign > 0 else "pi"
         text = f"{safe.corner.symbol} is {ends}, where the energy has no derivative"
         checks.append((_symbol(safe.corner.name("size")), "derivatives", text))
         if guarded:
             choice = _symbol(safe.corner.name("s")) - _PLAIN_DOWN_TO
-    lengths = {_symbol(m.a.l.name): _low(m.a) for m in safe.lengths}
-    totals = _totals(energy, lengths)
+    sums = Sums(energy, safe, reading, digits)
     if choice is not None:
-        choice = totals(sp.sympify(choice))  # whether an energy acts is a jump: never a matter of rounding
-    made = settled(reading.steps, value, gradient, hessian, checks, choice, totals if exact else lambda v: v)
+        choice = sums.safe(sp.sympify(choice))  # whether an energy acts is a jump: never a matter of rounding
+    elif guarded and safe.corner is None:
+        choice = sums.apart([*reading.steps.values(), value, *gradient, *hessian])
+    made = settled(
+        reading.steps, value, gradient, hessian, checks, choice, (lambda v: v) if digits == "plain" else sums.safe
+    )
     code = [*made.steps.values(), *made.outputs]
     used = {str(symbol) for step in code for symbol in step.free_symbols}
-    prologue = tuple(_prologue(safe, exact, used))
-    name = f"{safe.shape}_exact" if exact else safe.shape
+    prologue = tuple(_prologue(safe, digits, used))
+    name = safe.shape if digits == "plain" else f"{safe.shape}_{digits}"
     return Program(made.steps, made.energy, made.gradient, made.hessian, made.checks, made.choice, prologue, name)
 
 
@@ -84,53 +93,99 @@ def _low(segment: Segment) -> tuple[sp.Symbol, sp.Symbol]:
     return sp.Symbol(f"low_{segment.sub}", real=True), sp.Symbol(f"lower_{segment.sub}", real=True)
 
 
-def _totals(energy: Energy, lengths: dict[sp.Symbol, tuple[sp.Symbol, sp.Symbol]]) -> Callable[[Any], Any]:
-    """Sums of lengths, sliding coordinates and parameters, which may cancel, become calls of ``geometry.total``."""
-    inputs = {sp.Symbol(identifier(p.name), real=True) for p in energy.parameters}
-    inputs |= {symbol for n in energy.unknowns if not n.bold for symbol in row_symbols(n)}
-    total = sp.Function("total")
+class Sums:
+    """Sums of lengths, sliding coordinates and parameters, which may cancel, as calls of ``kernels.geometry``."""
 
-    def is_sum(value: Any) -> bool:
+    def __init__(self, energy: Energy, safe: Safe, reading: Components, digits: Digits) -> None:
+        self.lengths = {_symbol(m.a.l.name): _low(m.a) for m in safe.lengths}
+        self.inputs = {sp.Symbol(identifier(p.name), real=True) for p in energy.parameters}
+        self.inputs |= {symbol for n in energy.unknowns if not n.bold for symbol in row_symbols(n)}
+        self.positive = {  # coordinate differences that the domain keeps positive
+            reading.value(assumption.left) - reading.value(assumption.right)
+            for assumption in energy.domain
+            if energy.elsewhere != "zero"
+        }
+        self.digits = digits
+
+    def safe(self, value: Any) -> Any:
+        """An expression with every sum that may cancel replaced."""
+        return value.replace(self._is_sum, self._call)
+
+    def apart(self, values: Iterable[Any]) -> Any:
+        """What is positive where every sum with a length is more than rounding; None where there is no such sum."""
+        sums = {part for value in values for part in sp.sympify(value).atoms(sp.Add) if self._is_sum(part)}
+        found = {  # either sign of a sum
+            -part if part.could_extract_minus_sign() else part
+            for part in sums
+            if self._measured(part) and self._widened(part) is None
+        }
+        factors = [
+            sp.Function("apart")(self._call(part), max((s for s, _ in self._measured(part)), key=str))
+            for part in sorted(found, key=sp.default_sort_key)
+        ]
+        return sp.Mul(*factors) if factors else None
+
+    def _is_sum(self, value: Any) -> bool:
         if not value.is_Add:
             return False
         terms = [term.as_coeff_Mul() for term in value.args]
         atoms = {symbol for _, symbol in terms}
-        known = all(abs(factor) == 1 and (symbol in inputs or symbol in lengths) for factor, symbol in terms)
-        return known and (len(terms) > 2 or bool(atoms & set(lengths)))
+        known = all(abs(factor) == 1 and (symbol in self.inputs or symbol in self.lengths) for factor, symbol in terms)
+        return known and (len(terms) > 2 or bool(atoms & set(self.lengths)))
 
-    def call(value: Any) -> Any:
+    def _measured(self, value: Any) -> list[tuple[Any, Any]]:
+        """Lengths in a sum, with their factors."""
+        terms = [term.as_coeff_Mul() for term in value.args]
+        return [(symbol, factor) for factor, symbol in terms if symbol in self.lengths]
+
+    def _widened(self, value: Any) -> Any:
+        """A sum of a length and of a coordinate difference of the same sign, in which nothing cancels; else None."""
+        for sign in (1, -1):
+            for difference in self.positive:
+                rest = value - sign * difference
+                if sign * rest in self.lengths:
+                    return sign * sp.Function("in_order")(sign * rest, difference)
+        return None
+
+    def _call(self, value: Any) -> Any:
+        widened = self._widened(value)
+        if widened is not None:
+            return widened
         terms = sorted(
-            value.args, key=lambda term: (term.as_coeff_Mul()[1] not in lengths, str(term.as_coeff_Mul()[1]))
+            value.args, key=lambda term: (term.as_coeff_Mul()[1] not in self.lengths, str(term.as_coeff_Mul()[1]))
         )
-        measured = [(factor, lengths[s]) for factor, s in (term.as_coeff_Mul() for term in terms) if s in lengths]
-        digits = [factor * low for factor, (low, _) in measured]
-        return total(sum((factor * lower for factor, (_, lower) in measured), sp.S.Zero), *terms, *digits)
+        measured = self._measured(value)
+        low = sum((factor * self.lengths[symbol][0] for symbol, factor in measured), sp.S.Zero)
+        if self.digits != "twice" or not measured:
+            return sp.Function("total")(low, *terms)
+        lower = sum((factor * self.lengths[symbol][1] for symbol, factor in measured), sp.S.Zero)
+        return sp.Function("total_twice")(
+            lower, *terms, *(factor * self.lengths[symbol][0] for symbol, factor in measured)
+        )
 
-    return lambda value: value.replace(is_sum, call)
 
-
-def _prologue(safe: Safe, exact: bool, used: set[str]) -> list[str]:
+def _prologue(safe: Safe, digits: Digits, used: set[str]) -> list[str]:
     lines = []
     corner = safe.corner
     points = dict.fromkeys(p for m in safe.lengths for p in (m.a.tail, m.a.head))
     points |= dict.fromkeys((corner.a.tail, corner.a.head, corner.b.head) if corner else ())
     for point in sorted(points, key=safe.derivation.unknowns.index):
         lines.append(f"{point.label} = {', '.join(map(str, row_symbols(point)))}")
-    suffix = "_exact" if exact else ""
+    suffix, kept = {"plain": ("", 0), "exact": ("_exact", 1), "twice": ("_twice", 2)}[digits]
     for measure in safe.lengths:
         s = measure.a
-        low, lower = (str(symbol) if str(symbol) in used else "_" for symbol in _low(s))
-        made = f"segment{suffix}({s.tail.label}, {s.head.label})"
-        lines.append(f"{_symbol(s.l.name)}, {low}, {lower}, {identifier(s.d.name)} = {made}")
+        lows = [str(symbol) if str(symbol) in used else "_" for symbol in _low(s)[:kept]]
+        targets = ", ".join([str(_symbol(s.l.name)), *lows, identifier(s.d.name)])
+        lines.append(f"{targets} = segment{suffix}({s.tail.label}, {s.head.label})")
         lines.append(_unpacked(s.d.name))
-    return [*lines, *(_corner_lines(safe, corner, exact, used) if corner else [])]
+    return [*lines, *(_corner_lines(safe, corner, digits, used) if corner else [])]
 
 
 def _unpacked(name: Name) -> str:
     return f"{', '.join(map(str, given_symbols(name)))} = {identifier(name)}"
 
 
-def _corner_lines(safe: Safe, corner: Corner, exact: bool, used: set[str]) -> list[str]:
+def _corner_lines(safe: Safe, corner: Corner, digits: Digits, used: set[str]) -> list[str]:
     a, b = corner.a, corner.b
 
     def atom(base: str) -> str:
@@ -139,7 +194,7 @@ def _corner_lines(safe: Safe, corner: Corner, exact: bool, used: set[str]) -> li
     def vector(base: str) -> str:
         return identifier(corner.name(base, bold=True))
 
-    kind = ("right_corner" if safe.centred else "corner") + ("_exact" if exact else "")
+    kind = ("right_corner" if safe.centred else "corner") + ("" if digits == "plain" else "_exact")
     l_a, l_b, d_a, d_b = (identifier(symbol.name) for symbol in (a.l, b.l, a.d, b.d))
     ends = f"{a.head.label}, {b.head.label}"
     targets = f"{l_a}, {l_b}, {d_a}, {d_b}, {vector('normal')}, {atom('scale')}, {atom('C')}"

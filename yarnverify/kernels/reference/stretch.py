@@ -30,7 +30,7 @@ def _smooth(q: Any, p: Any) -> Any:
     k_s, = p
     x0 = x0x, x0y, x0z
     x1 = x1x, x1y, x1z
-    l_1, _, _, d_1 = segment(x0, x1)
+    l_1, d_1 = segment(x0, x1)
     d_1_x, d_1_y, d_1_z = d_1
     t0 = u0 - u1
     t1 = l_1 + t0
