@@ -35,7 +35,7 @@ from yarnverify.symbolic.reading import Reading, UnsupportedError, Value, fold, 
 from yarnverify.symbolic.tree import Expr, Name
 
 Poly = Any  # a SymPy PolyElement
-_LARGEST_PRODUCT = 60_000  # terms times terms; the paper's formulas stay below a tenth of it
+_LARGEST_PRODUCT = 200_000  # terms times terms; the paper's formulas stay below a thirtieth of it
 _ROOTS_COMPARED = 5  # how many known roots a new one is compared with, in all combinations
 _SPARE = 12  # generators kept free for square roots and angles that are met on the way
 

@@ -3,13 +3,14 @@ r"""Gradient and Hessian without 0/0: the blocks of ``derive`` rearranged, each 
 For a corner, two edges from one point with lengths la, lb and directions a, b, let C = a.b, m = a x b, s = |m|. Its angle
 phi enters the law either as phi or as theta = pi - phi. Two shapes of the same derivatives:
 
-``smooth``  for laws that are analytic where theta = 0 (or phi = 0), by derivatives in C, for C up to 5/8:
-            dV/da-end = V_C q_a/la, q_a = m x a,
+``smooth``  for laws that are analytic where theta = 0 (or phi = 0), by derivatives in C, up to where s is small:
+            dC/da-end = m x a/la,  dC/db-end = b x m/lb,  dC/do = c = v x m,
             aa: (V_pp P_a - V_CC m m^T - V_C (q_a a^T + a q_a^T))/la^2,   ab: (V_CC q_a q_b^T + V_C P_a P_b)/(la lb),
-            rows of the common point by translation.
-``polar``   wherever s > 0, by derivatives in phi, with n = m/s, t_a = n x a, t_b = b x n; rows of the common point directly,
-            with the third edge, since translation cancels digits where a yarn is folded onto itself:
-            v = a/la - b/lb,  w = a/la + b/lb,  k = (end_a - end_b)/(la lb),  r = n x v.
+            of C itself  oa: (b.v)/la I + w (dC/da)^T - (c + C v) a^T/la,   oo: (k.v) I + c w^T + w c^T + C v v^T.
+``polar``   wherever s > 0, by derivatives in phi, with n = m/s, t_a = n x a, t_b = b x n, r = n x v.
+
+Rows of the common point o directly, with the third edge, since translation cancels digits where a yarn is folded onto
+itself:     v = a/la - b/lb,  w = a/la + b/lb,  k = (end_a - end_b)/(la lb).
 """
 
 from __future__ import annotations
@@ -125,19 +126,17 @@ class Safe:
         def cross(a: Expr, b: Expr) -> Expr:
             return Expr("cross", (a, b))
 
-        found: dict[str, Expr] = {}
+        v, end = (Expr("symbol", value=k.name(base, bold=True)) for base in ("v", "k"))
+        found: dict[str, Expr] = {"v": v, "k": end, "w": vector("w", c.d / c.l + d.d / d.l)}
         if self.shape == "smooth":
             m = found["m"] = Expr("symbol", value=k.name("m", bold=True))
             found["q_a"], found["q_b"] = vector("q1", cross(m, c.d)), vector("q2", cross(d.d, m))
             found["slope_a"] = vector("c1", found["q_a"] / c.l)
             found["slope_b"] = vector("c2", found["q_b"] / d.l)
-            found["slope_o"] = -(found["slope_a"] + found["slope_b"])
+            found["slope_o"] = vector("c0", cross(v, m))
             return found
         n = found["n"] = Expr("symbol", value=k.name("n", bold=True))
-        v, found["k"] = (Expr("symbol", value=k.name(base, bold=True)) for base in ("v", "k"))
-        found["v"] = v
         found["t_a"], found["t_b"] = vector("t1", cross(n, c.d)), vector("t2", cross(d.d, n))
-        found["w"] = vector("w", c.d / c.l + d.d / d.l)
         found["r"], found["p"] = vector("r", cross(n, v)), vector("p", cross(n, found["w"]))
         found["slope_a"], found["slope_b"] = -(found["t_a"] / c.l), -(found["t_b"] / d.l)
         found["slope_o"] = found["r"]
@@ -167,11 +166,19 @@ class Safe:
         k, x = self.corner, self._vectors
         assert k is not None
         d1, d2, d3 = (self._scalar(what, k) for what in ("d", "dd", "turn"))
+        cosine, c0, v = Expr("symbol", value=k.name("C")), x["slope_o"], x["v"]
+        if row == column == "o":
+            y = self.define(k.name("y0", bold=True), d1 * x["w"] + d2 / 2 * c0)
+            z = self.define(k.name("z0", bold=True), d1 * cosine * v)
+            return d1 * (x["k"].T * v) * IDENTITY + c0 * y.T + y * c0.T + z * v.T
         if row == "o":
-            parts = {"o": (("a", "o"), ("b", "o")), "a": (("a", "a"), ("b", "a")), "b": (("a", "b"), ("b", "b"))}[
-                column
-            ]
-            return _minus_sum([self._corner_block(*part) for part in parts])
+            s, turned = (k.a, v) if column == "a" else (k.b, -v)
+            other = k.b.d if column == "a" else k.a.d
+            which = "4" if column == "a" else "5"
+            y = self.define(k.name("y4", bold=True), d1 * x["w"] + d2 * c0)
+            share = self.define(k.name("e" + which), d1 / s.l)
+            z = self.define(k.name("z" + which, bold=True), share * (c0 + cosine * turned))
+            return share * (other.T * turned) * IDENTITY + y * x[f"slope_{column}"].T - z * s.d.T
         if row == column:
             s, q = (k.a, x["q_a"]) if row == "a" else (k.b, x["q_b"])
             which = "1" if row == "a" else "2"
@@ -273,8 +280,8 @@ class Safe:
         return (*self.lengths, *((self.corner,) if self.corner is not None else ()))
 
     def _is_hub(self, point: Name) -> bool:
-        """Whether translation may give the rows of a point: never in the polar shape, where that cancels digits."""
-        return self.shape == "smooth" and self.derivation._is_hub(point)
+        """Whether translation may give the rows of a point: never at a corner, where that cancels digits."""
+        return self.corner is None and self.derivation._is_hub(point)
 
     @staticmethod
     def _signed(block: Expr, scale: int) -> Expr:

@@ -27,9 +27,8 @@ from yarnverify.symbolic.tree import Name
 
 Digits: TypeAlias = Literal["plain", "exact", "twice"]
 
-# Cosines between the edges beyond which the rows of the common point cancel: by more than targets allow, or by more than
-# the condition of the problem explains.
-_SMOOTH_UP_TO = {"exact": sp.Rational(5, 8), "plain": sp.Rational(13, 16)}
+# How near to 1 the cosine between the edges may come; a yarn folded further has sines whose products may underflow.
+_SMOOTH_UP_TO = 1 - sp.Rational(1, 2**20)
 _PLAIN_DOWN_TO = sp.Rational(1, 2**16)  # sine; a plain cross product keeps some 37 of 53 bits there
 
 
@@ -62,7 +61,7 @@ def safe_program(
     checks += domain_checks(energy, reading)
     choice = active(energy, reading)
     if safe.corner is not None and safe.shape == "smooth" and not alone:
-        choice = _SMOOTH_UP_TO["plain" if digits == "plain" else "exact"] - _symbol(safe.corner.name("C"))
+        choice = _SMOOTH_UP_TO - _symbol(safe.corner.name("C"))
     if safe.corner is not None and safe.shape == "polar":
         ends = "0 or pi" if alone else "0" if safe.corner.sign > 0 else "pi"
         text = f"{safe.corner.symbol} is {ends}, where the energy has no derivative"
@@ -200,6 +199,8 @@ def _corner_lines(safe: Safe, corner: Corner, digits: Digits, used: set[str]) ->
     targets = f"{l_a}, {l_b}, {d_a}, {d_b}, {vector('normal')}, {atom('scale')}, {atom('C')}"
     lines = [f"{targets} = {kind}({a.tail.label}, {ends})"]
     lines += [_unpacked(name) for name in (a.d.name, b.d.name)]
+    lines.append(f"{vector('v')}, {vector('k')} = closing({a.tail.label}, {ends})")
+    lines += [_unpacked(corner.name(base, bold=True)) for base in ("v", "k")]
     cosine = atom("C") if corner.sign > 0 else f"-{atom('C')}"
     if safe.shape == "smooth":
         lines.append(f"{vector('m')} = scaled({vector('normal')}, {atom('scale')})")
@@ -215,5 +216,4 @@ def _corner_lines(safe: Safe, corner: Corner, digits: Digits, used: set[str]) ->
     theta = str(_symbol(corner.symbol))
     functions = {theta: "angle", atom("psi"): "deviation", atom("half"): "half_tangent"}
     lines += [f"{name} = {function}({atom('s')}, {cosine})" for name, function in functions.items() if name in used]
-    lines.append(f"{vector('v')}, {vector('k')} = closing({a.tail.label}, {ends})")
-    return [*lines, *(_unpacked(corner.name(base, bold=True)) for base in ("v", "k"))]
+    return lines

@@ -35,13 +35,13 @@ def _polar_exact(q: Any, p: Any) -> Any:
     l_1, l_3, d_1, d_3, normal_phi, scale_phi, C_phi = right_corner_exact(x0, x1, x3)
     d_1_x, d_1_y, d_1_z = d_1
     d_3_x, d_3_y, d_3_z = d_3
+    v_phi, k_phi = closing(x0, x1, x3)
+    v_phi_x, v_phi_y, v_phi_z = v_phi
+    k_phi_x, k_phi_y, k_phi_z = k_phi
     n_phi, size_phi = normal_of(normal_phi)
     s_phi = size_phi*scale_phi
     n_phi_x, n_phi_y, n_phi_z = n_phi
     psi_phi = deviation(s_phi, C_phi)
-    v_phi, k_phi = closing(x0, x1, x3)
-    v_phi_x, v_phi_y, v_phi_z = v_phi
-    k_phi_x, k_phi_y, k_phi_z = k_phi
     ddV_angle = L*k_x
     dV_angle = ddV_angle*psi_phi
     r_phi_x = n_phi_y*v_phi_z - n_phi_z*v_phi_y
