@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from yarnverify.simulation.fabric import Yarn
+    from yarnverify.simulation.cloth import Yarn
 
 Indices = NDArray[np.int64]
 

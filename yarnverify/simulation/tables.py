@@ -14,7 +14,7 @@ from yarnverify.errors import InputError
 from yarnverify.kernels import bending, parallel_contact, shear, stretch
 
 if TYPE_CHECKING:
-    from yarnverify.simulation.fabric import Fabric
+    from yarnverify.simulation.cloth import Fabric
 
 Integers = NDArray[np.int32]
 Numbers = NDArray[np.float64]

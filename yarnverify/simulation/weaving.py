@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from yarnverify.errors import InputError
-
-if TYPE_CHECKING:
-    from yarnverify.simulation.fabric import Fabric
+from yarnverify.simulation.cloth import Fabric, Family, Yarn
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -26,18 +24,17 @@ def woven(over: NDArray[np.int8], L: float, R: float, tails: float | None, keep:
     tails, keep
         As in ``fabric.weave``.
     """
-    from yarnverify.simulation.fabric import Fabric, Yarn
-
     kept = _kept(keep, over.shape, L)
     grid = np.argwhere(kept)
     number = np.full(over.shape, -1)
     number[kept] = np.arange(len(grid))
     points = [np.column_stack([grid * L, np.zeros(len(grid))])]
     count = len(grid)
-    yarns: list[tuple[str, str, Indices, Indices]] = []  # name, family, nodes, arc lengths in units of L or tails
-    arcs = []
+    yarns: list[tuple[str, Family, Indices]] = []
+    arcs: list[NDArray[np.float64]] = []
     of: dict[str, Indices] = {}
-    for family, numbers in (("warp", number), ("weft", number.T)):
+    families: tuple[tuple[Family, Indices], ...] = (("warp", number), ("weft", number.T))
+    for family, numbers in families:
         lines, runs = _runs(numbers)
         of[family] = np.empty(len(grid), np.int64)
         first = len(yarns)
@@ -52,18 +49,18 @@ def woven(over: NDArray[np.int8], L: float, R: float, tails: float | None, keep:
         parts: dict[int, int] = {}
         for k, (line, run) in enumerate(zip(lines, runs, strict=True)):
             parts[line] = parts.get(line, -1) + 1
-            arc = L * np.arange(len(run))
+            arc: NDArray[np.float64] = L * np.arange(len(run), dtype=float)
             if tails is not None:
                 run = np.concatenate([[count + 2 * k], run, [count + 2 * k + 1]])
                 arc = np.concatenate([[0.0], tails + arc, [tails + arc[-1] + tails]])
-            yarns.append((f"{family} {line}" + (f" part {parts[line]}" if parts[line] else ""), family, run, arc))
+            yarns.append((f"{family} {line}" + (f" part {parts[line]}" if parts[line] else ""), family, run))
             arcs.append(arc)
         count += 0 if tails is None else 2 * len(runs)
     positions = np.concatenate(points)
     starts = positions.size + np.concatenate([[0], np.cumsum([len(arc) for arc in arcs])])
     made = tuple(
-        Yarn(name, family, nodes, np.arange(start, start + len(nodes)))  # type: ignore[arg-type]
-        for (name, family, nodes, _), start in zip(yarns, starts[:-1], strict=True)
+        Yarn(name, family, nodes, np.arange(start, start + len(nodes)))
+        for (name, family, nodes), start in zip(yarns, starts[:-1], strict=True)
     )
     Q = np.concatenate([positions.ravel(), *arcs])
     crossings = np.arange(len(grid))
