@@ -88,7 +88,7 @@ class System:
     Parameters
     ----------
     Q
-        A configuration, (size,); only its size is kept.
+        A configuration, (size,), such as the rest. Its coordinates serve to order the unknowns for direct solvers.
     terms
         Energies.
     active
@@ -140,6 +140,27 @@ class System:
         self._forms: list[Form] = [form_of(t.kernel) if definite == "quick" else eigenvalues for t in self.terms]
         self._memory: dict[tuple[int, int], list[Array]] = {}
         self.seconds = {"kernels": 0.0, "assembly": 0.0}
+        self.nodes, self.coordinates = self._owners(np.asarray(Q, float), tables)
+
+    @staticmethod
+    def _heads(tables: Sequence[tuple[Array, Sequence[str]]], size: int) -> tuple[Array, Array]:
+        """The entry that stands for the node of each entry of a configuration, and which of them are points."""
+        head, point = np.arange(size), np.zeros(size, bool)
+        for rows, labels in tables:
+            at = {label: row for row, label in zip(rows, labels, strict=True)}
+            for label, row in at.items():
+                name, _, axis = label.partition(".")
+                x = at.get(f"{name}.x" if axis else f"x{name[1:]}.x")
+                if x is not None:  # a sliding coordinate u1 lies at the point x1
+                    head[row] = x
+                    point[x] = True
+        return head, point
+
+    def _owners(self, Q: Array, tables: Sequence[tuple[Array, Sequence[str]]]) -> tuple[Array, Array | None]:
+        """The node of each unknown (active,), and coordinates of the nodes (nodes, 3) if all have some."""
+        head, point = self._heads(tables, self.size)
+        heads, nodes = np.unique(head[self.active], return_inverse=True)
+        return nodes, Q[heads[:, None] + np.arange(3)] if point[heads].all() else None
 
     @property
     def count(self) -> int:

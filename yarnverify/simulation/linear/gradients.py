@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from yarnverify.simulation.linear.protocol import LinearSolveError
+from yarnverify.simulation.linear.threads import one_thread
 
 Array = NDArray[Any]
 
@@ -52,6 +53,7 @@ class ConjugateGradients:
         self._bands: list[tuple[int, Array, Array]] | None = None
         self._entries = 0
 
+    @one_thread()
     def factorise(self, matrix: Any) -> Gradients:
         """Factorise the line blocks of a symmetric sparse matrix.
 
@@ -109,6 +111,7 @@ class Gradients:
         self._tolerance, self._iterations = tolerance, iterations
         self.steps = 0  # of the last solution
 
+    @one_thread()
     def solve(self, b: Array) -> Array:
         """The solution for a right-hand side (n,).
 
@@ -139,7 +142,7 @@ class Gradients:
             image = self._matrix @ direction
             curvature = _sum(direction, image)
             if not curvature > 0:
-                raise LinearSolveError("conjugate gradients: the matrix is not positive definite")
+                raise LinearSolveError("conjugate gradients: the matrix is not positive definite", direction)
             step = product / curvature
             x += step * direction
             residual -= step * image

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from scipy.linalg import blas, lapack
 from yarnverify.simulation.linear.ordering import Dissection, dissect
 from yarnverify.simulation.linear.protocol import LinearSolveError, checked
 from yarnverify.simulation.linear.superlu import node_graph
+from yarnverify.simulation.linear.threads import one_thread
 
 Array = NDArray[Any]
 
@@ -40,8 +42,7 @@ class _Front:
     own: _Block
     below: _Block
     parent: int
-    inner: Array  # where touched unknowns stand among the parent's own, as far as they do
-    outer: Array  # and the rest, among those that the parent touches
+    runs: list[tuple[int, int, int]]  # touched unknowns start to stop, and their place among the parent's own and touched
 
 
 class Multifrontal:
@@ -62,6 +63,7 @@ class Multifrontal:
         self._fronts: list[_Front] | None = None
         self._entries = 0
 
+    @one_thread()
     def factorise(self, matrix: Any) -> MultifrontalFactor:
         """Factorise a symmetric sparse matrix (n, n), both triangles given.
 
@@ -82,11 +84,7 @@ class Multifrontal:
             own.reshape(-1, order="F")[front.own.target] = matrix.data[front.own.source]
             below.reshape(-1, order="F")[front.below.target] = matrix.data[front.below.source]
             for child, part in rest[number]:
-                c, inner, outer = child.inner.size, child.inner, child.outer
-                own[inner[:, None], inner] += part[:c, :c]
-                if outer.size:
-                    below[outer[:, None], inner] += part[c:, :c]
-                    left[outer[:, None], outer] += part[c:, c:]
+                _extend(own, below, left, child.runs, part)
             rest[number] = []
             eliminated, left = _eliminate(own, below, left)
             done.append(eliminated)
@@ -141,14 +139,30 @@ def _fronts(tree: Dissection, graph: Any, rank: Array, start: Array, entries: An
         target = j[~inside] * s + np.searchsorted(unknowns[k], i[~inside])
         below = _Block(source[~inside], target.astype(np.int32 if own * s < 2**31 else np.int64))
         parent = tree.parents[k]
-        inner = outer = np.empty(0, np.int64)
+        runs: list[tuple[int, int, int]] = []
         if s:
             end = int(start[ends[parent]])
             begin = int(start[ends[parent] - len(tree.groups[parent])])
-            mine = unknowns[k] < end
-            inner = unknowns[k][mine] - begin
-            outer = np.searchsorted(unknowns[parent], unknowns[k][~mine])
-        yield _Front(first, last, unknowns[k], own_block, below, parent, inner, outer)
+            place = np.where(
+                unknowns[k] < end, unknowns[k] - begin, end - begin + np.searchsorted(unknowns[parent], unknowns[k])
+            )
+            # a run ends where places jump, and between the parent's own and the others
+            cuts = np.flatnonzero((np.diff(place, prepend=-2) != 1) | (place == end - begin))
+            runs = [(int(a), int(b), int(place[a])) for a, b in pairwise([*cuts, s])]
+        yield _Front(first, last, unknowns[k], own_block, below, parent, runs)
+
+
+def _extend(own: Array, below: Array, left: Array, runs: list[tuple[int, int, int]], part: Array) -> None:
+    """Add what is left of a child (lower triangle; the other one holds nothing of use) to its parent's blocks."""
+    p = len(own)
+    for number, (a, b, column) in enumerate(runs):
+        for c, d, row in runs[number:]:
+            if row < p:
+                own[row : row + d - c, column : column + b - a] += part[c:d, a:b]
+            elif column < p:
+                below[row - p : row - p + d - c, column : column + b - a] += part[c:d, a:b]
+            else:
+                left[row - p : row - p + d - c, column - p : column - p + b - a] += part[c:d, a:b]
 
 
 def _spread(start: Array, ranks: Array) -> Array:
@@ -203,6 +217,7 @@ class MultifrontalFactor:
         """Memory that the factor takes."""
         return sum(e.factor.nbytes + e.below.nbytes for e in self._done)
 
+    @one_thread()
     def solve(self, b: Array) -> Array:
         """The solution, residual checked."""
         return checked(self._matrix, b, self._raw(b), self._raw, "multifrontal")

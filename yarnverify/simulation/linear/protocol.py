@@ -12,7 +12,14 @@ TOLERANCE = 1e-9  # of a residual, relative to |A| |x| + |b|
 
 
 class LinearSolveError(ArithmeticError):
-    """A matrix that could not be factorised, or a solution that does not solve."""
+    """A matrix that could not be factorised, or a solution that does not solve.
+
+    ``direction`` is a vector v with v.A v < 0, where a solver has come upon one.
+    """
+
+    def __init__(self, message: str, direction: Array | None = None) -> None:
+        super().__init__(message)
+        self.direction = direction
 
 
 class Factor(Protocol):
