@@ -35,12 +35,24 @@ class Sliding:
     """Annotation of an unknown sliding coordinate: rest arc length along a yarn, in metres."""
 
 
+class Velocity:
+    """Annotation of the velocity of a point: three components, in metres per second."""
+
+
+class SlidingSpeed:
+    """Annotation of the velocity of a sliding coordinate, in metres per second."""
+
+
+_KINDS = {Point: (True, "m"), Sliding: (False, "m"), Velocity: (True, "m s^-1"), SlidingSpeed: (False, "m s^-1")}
+
+
 @dataclass(frozen=True)
 class Real:
     """Annotation of a parameter of any sign: ``Real["rad"]``."""
 
     unit: str
     positive: bool = False
+    vector: bool = False
 
     def __class_getitem__(cls, unit: str) -> Real:
         return cls(unit)
@@ -53,9 +65,21 @@ class Positive:
         return Real(unit, positive=True)
 
 
+class Vector:
+    """Annotation of a parameter with three components of any sign: ``Vector["m s^-2"]``."""
+
+    def __class_getitem__(cls, unit: str) -> Real:
+        return Real(unit, vector=True)
+
+
 def length(a: Expr) -> Expr:
     """Length of a vector."""
     return Expr("norm", (a,))
+
+
+def square(a: Expr) -> Expr:
+    """Square of the length of a vector."""
+    return Expr("mul", (a.T, a))
 
 
 def unit(a: Expr) -> Expr:
@@ -97,8 +121,8 @@ class Energy:
     ----------
     name, document, section, unit, summary
         What it is, and which section of which document prints it.
-    unknowns, parameters
-        In the order of the function's signature.
+    unknowns, units, parameters
+        In the order of the function's signature; ``units`` are those of the unknowns.
     expression
         The energy itself.
     domain
@@ -116,6 +140,7 @@ class Energy:
     unit: str
     summary: str
     unknowns: tuple[Name, ...]
+    units: tuple[str, ...]
     parameters: tuple[Parameter, ...]
     expression: Expr
     domain: tuple[Assumption, ...] = ()
@@ -156,9 +181,11 @@ def _unknowns(function: Callable[..., Any], hints: dict[str, Any]) -> dict[str, 
     for key, parameter in inspect.signature(function).parameters.items():
         if parameter.kind is parameter.KEYWORD_ONLY:
             continue
-        if hints.get(key) not in (Point, Sliding):
-            raise TypeError(f"argument {key!r} of {function.__name__} must be annotated Point or Sliding")
-        found[key] = Expr("symbol", value=name_of(key, hints[key] is Point, indexed=True))
+        if hints.get(key) not in _KINDS:
+            raise TypeError(
+                f"argument {key!r} of {function.__name__} must be annotated Point or Sliding, Velocity or SlidingSpeed"
+            )
+        found[key] = Expr("symbol", value=name_of(key, _KINDS[hints[key]][0], indexed=True))
     return found
 
 
@@ -170,9 +197,10 @@ def _parameters(function: Callable[..., Any], hints: dict[str, Any]) -> dict[str
         kind = hints.get(key)
         if not isinstance(kind, Real):
             raise TypeError(
-                f'parameter {key!r} of {function.__name__} must be annotated Positive["unit"] or Real["unit"]'
+                f"parameter {key!r} of {function.__name__} must be annotated "
+                'Positive["unit"], Real["unit"] or Vector["unit"]'
             )
-        found[key] = Parameter(name_of(key), kind.unit, kind.positive)
+        found[key] = Parameter(name_of(key, kind.vector), kind.unit, kind.positive)
     return found
 
 
@@ -233,7 +261,8 @@ def energy(
             raise TypeError(f"{name}: an energy is a scalar, and this is a {kind.value}")
         return Energy(
             name, document, section, unit, inspect.getdoc(function) or "",
-            tuple(node.name for node in unknowns.values()), tuple(parameters.values()),
+            tuple(node.name for node in unknowns.values()), tuple(_KINDS[hints[key]][1] for key in unknowns),
+            tuple(parameters.values()),
             expression, tuple(where), removable, singular, rest or {}, elsewhere,
         )  # fmt: skip
 
@@ -297,5 +326,6 @@ def load_declarations(folder: Path) -> Declarations:
 
 __all__ = [
     "Assumption", "Declarations", "Energy", "Parameter", "Point", "Positive", "Quantity", "Real", "Sliding",
-    "angle", "assumptions", "deviation", "energy", "length", "load_declarations", "name_of", "quantity", "unit",
+    "SlidingSpeed", "Vector", "Velocity", "angle", "assumptions", "deviation", "energy", "length", "load_declarations",
+    "name_of", "quantity", "square", "unit",
 ]  # fmt: skip
