@@ -1,4 +1,4 @@
-from yarnverify.symbolic.declare import Point, Positive, Sliding, SlidingSpeed, Velocity, energy, square
+from yarnverify.symbolic.declare import Point, Positive, Sliding, SlidingSpeed, Velocity, energy, square, unchanged_by
 from yarnverify.symbolic.integrals import integral
 
 
@@ -6,6 +6,7 @@ from yarnverify.symbolic.integrals import integral
     unit="J",
     domain=r"u_1 > u_0",
     rest={"x0": (0, 0, 0), "x1": (1, 0, 0), "u0": 0, "u1": 1, "v0": (0, 0, 0), "v1": (0, 0, 0), "w0": 0, "w1": 0},
+    unchanged=("translation", "rotation", "sliding"),
 )
 def kinetic(
     x0: Point, x1: Point, u0: Sliding, u1: Sliding,
@@ -22,3 +23,14 @@ def kinetic(
         return ((u1 - u) * first + (u - u0) * last) / (u1 - u0)
 
     return integral(lambda u: rho / 2 * square(material(u)), u0, u1)
+
+
+@unchanged_by(kinetic)
+def sliding_along_at_the_first_end(x0: Point, x1: Point, u0: Sliding, u1: Sliding):
+    """The node moves along the yarn, which slides back through it: no material moves."""
+    return {"v0": (x1 - x0) / (u1 - u0), "w0": 1}
+
+
+@unchanged_by(kinetic)
+def sliding_along_at_the_last_end(x0: Point, x1: Point, u0: Sliding, u1: Sliding):
+    return {"v1": (x1 - x0) / (u1 - u0), "w1": 1}

@@ -55,7 +55,9 @@ def parameters_of(kernel: Kernel, given: Values, n: int, dtype: Any) -> tuple[An
     values = []
     for name, positive, _ in kernel.parameters:
         vector, _, axis = name.rpartition("_")
-        value = _component(kernel, vector, given[vector], axis, n) if vector in kernel.vectors else np.asarray(given[name])
+        value = (
+            _component(kernel, vector, given[vector], axis, n) if vector in kernel.vectors else np.asarray(given[name])
+        )
         if value.dtype.kind not in "iubf":
             raise TypeError(f"{kernel.name}: {name} must be real, not {value.dtype}")
         if value.shape not in ((), (n,)):

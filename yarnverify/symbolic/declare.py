@@ -132,6 +132,8 @@ class Energy:
         One state of least energy: a value for each unknown (3 for a point), and 1 for each parameter not named.
     elsewhere
         What holds outside the domain: ``error``, or ``zero`` for an energy that does not act there.
+    unchanged
+        Motions that leave the energy as it is: ``translation``, ``rotation``, ``sliding`` (all sliding coordinates together).
     """
 
     name: str
@@ -148,6 +150,17 @@ class Energy:
     singular: str = ""
     rest: dict[str, Any] = field(default_factory=dict)
     elsewhere: str = "error"
+    unchanged: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion of its own that leaves an energy as it is: the rate of each unknown that moves, which may depend on the state."""
+
+    energy: str
+    name: str
+    summary: str
+    rates: tuple[tuple[Name, Expr], ...]
 
 
 @dataclass(frozen=True)
@@ -240,6 +253,7 @@ def energy(
     singular: str = "",
     rest: dict[str, Any] | None = None,
     elsewhere: Literal["error", "zero"] = "error",
+    unchanged: tuple[Literal["translation", "rotation", "sliding"], ...] = (),
 ) -> Callable[[Callable[..., Expr]], Energy]:
     """Declare an energy; see the module's example and ``Energy`` for what the options mean."""
 
@@ -263,7 +277,7 @@ def energy(
             name, document, section, unit, inspect.getdoc(function) or "",
             tuple(node.name for node in unknowns.values()), tuple(_KINDS[hints[key]][1] for key in unknowns),
             tuple(parameters.values()),
-            expression, tuple(where), removable, singular, rest or {}, elsewhere,
+            expression, tuple(where), removable, singular, rest or {}, elsewhere, unchanged,
         )  # fmt: skip
 
     return declare
@@ -285,12 +299,27 @@ def quantity(
     return declare
 
 
+def unchanged_by(energy: Energy) -> Callable[[Callable[..., dict[str, Expr | int]]], Motion]:
+    """Declare a motion that leaves an energy as it is: a function of unknowns that gives the rate of each that moves."""
+
+    def declare(function: Callable[..., dict[str, Expr | int]]) -> Motion:
+        labels = {name.label: name for name in energy.unknowns}
+        rates = function(**_unknowns(function, get_type_hints(function)))
+        if strange := set(rates) - set(labels):
+            raise ValueError(f"{function.__name__}: {energy.name} has no unknown {', '.join(sorted(strange))}")
+        moves = tuple((labels[label], as_expr(rate)) for label, rate in rates.items())
+        return Motion(energy.name, function.__name__.replace("_", " "), inspect.getdoc(function) or "", moves)
+
+    return declare
+
+
 @dataclass(frozen=True)
 class Declarations:
     """All that one folder of derivations declares."""
 
     energies: tuple[Energy, ...] = ()
     quantities: tuple[Quantity, ...] = ()
+    motions: tuple[Motion, ...] = ()
 
 
 def load_declarations(folder: Path) -> Declarations:
@@ -303,6 +332,7 @@ def load_declarations(folder: Path) -> Declarations:
     """
     energies: dict[str, Energy] = {}
     quantities: list[Quantity] = []
+    motions: list[Motion] = []
     for path in sorted(path for path in folder.glob("*.py") if path.is_file()):
         namespace: dict[str, Any] = {"__name__": path.stem, "__file__": str(path)}
         try:
@@ -321,11 +351,13 @@ def load_declarations(folder: Path) -> Declarations:
                 energies[value.name] = value
             elif isinstance(value, Quantity):
                 quantities.append(value)
-    return Declarations(tuple(energies.values()), tuple(quantities))
+            elif isinstance(value, Motion):
+                motions.append(value)
+    return Declarations(tuple(energies.values()), tuple(quantities), tuple(motions))
 
 
 __all__ = [
-    "Assumption", "Declarations", "Energy", "Parameter", "Point", "Positive", "Quantity", "Real", "Sliding",
+    "Assumption", "Declarations", "Energy", "Motion", "Parameter", "Point", "Positive", "Quantity", "Real", "Sliding",
     "SlidingSpeed", "Vector", "Velocity", "angle", "assumptions", "deviation", "energy", "length", "load_declarations",
-    "name_of", "quantity", "square", "unit",
+    "name_of", "quantity", "square", "unchanged_by", "unit",
 ]  # fmt: skip

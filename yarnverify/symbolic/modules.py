@@ -30,6 +30,7 @@ from yarnverify.symbolic.emit import (
     text_of,
     used_functions,
 )
+from yarnverify.symbolic.invariants import prove_invariants
 from yarnverify.symbolic.measures import NoMeasuresError
 from yarnverify.symbolic.prove import read_with
 from yarnverify.symbolic.reading import UnsupportedError
@@ -47,9 +48,7 @@ SUMMARY = {
     "printed": "the document's own formulas, misprints included",
 }
 VARIANTS = tuple(SUMMARY)
-_PLAIN_SUMS = (
-    "no measures here: sums are formed once, in plain arithmetic, and lose only what the rounding of their terms explains"
-)
+_PLAIN_SUMS = "no measures here: sums are formed once, in plain arithmetic, and lose only what the rounding of their terms explains"
 _SERIES_TOP, _SERIES_DEGREE = Fraction(97, 500), 13  # sin(t/4)^2 is 0.1939 where cos t = -1/4
 
 
@@ -130,6 +129,7 @@ def proved(energy: Energy, declarations: Declarations) -> Proved:
     NotRunError
         If a derived block is not proved.
     """
+    _require_proofs(energy.name, prove_invariants(energy, declarations.motions))
     derivation = derive_declared(energy, declarations.quantities)
     if derivation is None:
         section = declared_section(energy)
@@ -171,7 +171,7 @@ def derived_programs(energy: Energy, found: Proved, variant: str) -> tuple[list[
 def _require_proofs(what: str, found: dict[str, Finding]) -> None:
     for block, finding in found.items():
         if finding.verdict is not Verdict.PROVED:
-            raise NotRunError(f"{what}: derived block {block} is {finding.verdict}: {finding.reason}")
+            raise NotRunError(f"{what}: {block} is {finding.verdict}: {finding.reason}")
 
 
 def derived_program(energy: Energy, derivation: Derivation) -> Program:
@@ -284,7 +284,9 @@ def module_text(
             for symbol in given_symbols(parameter.name)
         ],
         "vectors": _tuple(identifier(p.name) for p in energy.parameters if p.name.bold),
-        "velocities": _tuple(n.label for n, unit in zip(energy.unknowns, energy.units, strict=True) if n.bold and unit != "m"),
+        "velocities": _tuple(
+            n.label for n, unit in zip(energy.unknowns, energy.units, strict=True) if n.bold and unit != "m"
+        ),
         "row_units": row_units(energy),
         "rows": len(dofs),
         "unpack": ", ".join(labels) + ("," if len(labels) == 1 else ""),
