@@ -7,7 +7,7 @@ from typing import Any
 
 import sympy as sp
 
-from yarnverify.symbolic.declare import Energy
+from yarnverify.symbolic.declare import Energy, length
 from yarnverify.symbolic.emit import (
     Check,
     Components,
@@ -55,6 +55,8 @@ def safe_program(energy: Energy, safe: Safe, exact: bool, shapes: tuple[Safe, ..
         checks.append((_symbol(segment.l.name), "energy", zero_length((segment.tail, segment.head))))
     checks += domain_checks(energy, reading)
     choice = active(energy, reading)
+    if choice is not None:
+        choice = choice.xreplace({reading.value(length(s.vector)): _symbol(s.l.name) for s in segments})
     if safe.corner is not None and safe.shape == "smooth" and not alone:
         choice = _SMOOTH_UP_TO["exact" if exact else "plain"] - _symbol(safe.corner.name("C"))
     if safe.corner is not None and safe.shape == "polar":
@@ -114,8 +116,10 @@ def _prologue(safe: Safe, exact: bool, used: set[str]) -> list[str]:
     corner = safe.corner
     points = dict.fromkeys(p for m in safe.lengths for p in (m.a.tail, m.a.head))
     points |= dict.fromkeys((corner.a.tail, corner.a.head, corner.b.head) if corner else ())
-    for point in sorted(points, key=safe.derivation.unknowns.index):
-        lines.append(f"{point.label} = {', '.join(map(str, row_symbols(point)))}")
+    unknowns = safe.derivation.unknowns
+    for point in sorted(points, key=(*unknowns, *safe.section.parameters).index):
+        components = row_symbols(point) if point in unknowns else given_symbols(point)
+        lines.append(f"{point.label} = {', '.join(map(str, components))}")
     suffix = "_exact" if exact else ""
     for measure in safe.lengths:
         s = measure.a
