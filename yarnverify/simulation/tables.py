@@ -31,7 +31,8 @@ class Table:
     parameters
         What the geometry knows of the kernel's parameters, by name, each (n,).
     places
-        Where an element lies, by name, each (n,): ``yarn`` (index), ``node`` (the one it is about, or the first of two).
+        Where an element lies, by name, each (n,): ``yarn`` (index), ``node`` (the one it is about, or the first of two),
+        ``place`` (that node's place in the fabric's chain).
     """
 
     rows: Integers
@@ -96,7 +97,7 @@ def segments(fabric: Fabric, kernel: ModuleType = stretch) -> Table:
     nodes, slides = fabric.chain.nodes, fabric.chain.slides
     x0, x1, u0, u1 = nodes[first], nodes[second], slides[first], slides[second]
     arguments = {"x0": x0, "x1": x1, "u0": u0, "u1": u1, "v0": x0, "v1": x1, "w0": u0, "w1": u1}
-    return table(kernel, arguments, None, {"yarn": fabric.chain.yarn[first], "node": x0})
+    return table(kernel, arguments, None, {"yarn": fabric.chain.yarn[first], "node": x0, "place": first})
 
 
 def bends(fabric: Fabric, kernel: ModuleType = bending) -> Table:
@@ -105,7 +106,7 @@ def bends(fabric: Fabric, kernel: ModuleType = bending) -> Table:
     nodes, slides = fabric.chain.nodes, fabric.chain.slides
     arguments = {"x0": nodes[here], "x1": nodes[after], "x2": nodes[before], "u0": slides[here], "u1": slides[after],
                  "u2": slides[before]}  # fmt: skip
-    return table(kernel, arguments, None, {"yarn": fabric.chain.yarn[here], "node": nodes[here]})
+    return table(kernel, arguments, None, {"yarn": fabric.chain.yarn[here], "node": nodes[here], "place": here})
 
 
 def shears(fabric: Fabric, kernel: ModuleType = shear) -> Table:
@@ -138,5 +139,5 @@ def contacts(fabric: Fabric, kernel: ModuleType = parallel_contact) -> Table:
     opposite = side[nodes[first]] != side[nodes[second]]
     arguments = {"u0": fabric.chain.slides[first], "u1": fabric.chain.slides[second]}
     distance = np.where(opposite, 4 * fabric.R, 2 * fabric.R)
-    places = {"yarn": fabric.chain.yarn[first], "node": nodes[first], "next": nodes[second]}
+    places = {"yarn": fabric.chain.yarn[first], "node": nodes[first], "next": nodes[second], "place": first}
     return table(kernel, arguments, {"L": fabric.L, "d": distance}, places)
