@@ -20,7 +20,7 @@ from scipy import sparse
 from yarnverify.kernels import ElementError
 from yarnverify.kernels.batch import Batch
 from yarnverify.simulation import scatter
-from yarnverify.simulation.pattern import Pattern
+from yarnverify.simulation.pattern import Elements, Pattern, zeros
 from yarnverify.simulation.semidefinite import ALONE, Form, eigenvalues, form_of
 from yarnverify.simulation.tables import Table
 
@@ -61,7 +61,8 @@ class Term:
 
     def some(self, part: Any) -> dict[str, Any]:
         """Parameters of some elements."""
-        return {k: v if np.ndim(v) == 0 else v[part] for k, v in self.parameters.items()}
+        vectors = self.kernel.KERNEL.vectors
+        return {k: v if np.ndim(v) == (k in vectors) else v[..., part] for k, v in self.parameters.items()}
 
 
 class Evaluation(NamedTuple):
@@ -96,7 +97,7 @@ class System:
     loads
         Constant forces, (size,); their energy is ``-loads . Q``.
     others
-        Tables that share the matrix but are summed elsewhere, as (rows, labels): the kinetic energy.
+        Tables that share the matrix but are summed elsewhere: the kinetic energy.
     engine
         ``numpy`` or ``compiled``, with the same bits.
     definite
@@ -115,7 +116,7 @@ class System:
         active: ArrayLike,
         loads: ArrayLike | None = None,
         *,
-        others: Sequence[tuple[Array, Sequence[str]]] = (),
+        others: Sequence[Elements] = (),
         engine: Literal["numpy", "compiled"] = "numpy",
         definite: Literal["quick", "eigenvalues"] = "quick",
     ) -> None:
@@ -133,7 +134,7 @@ class System:
             rows = term.table.rows
             if rows.size and not (rows.min() >= 0 and rows.max() < self.size):
                 raise ValueError(f"{term.name}: an element reads beyond the configuration")
-        tables = [(term.table.rows, term.kernel.DOFS) for term in self.terms]
+        tables = [Elements(t.table.rows, t.kernel.DOFS, zeros(t.kernel.KERNEL)) for t in self.terms]
         self.pattern = Pattern(self.size, self.active, [*tables, *others])
         self.engine = engine
         self._add = scatter.compiled() if engine == "compiled" else scatter.add
@@ -143,11 +144,11 @@ class System:
         self.nodes, self.coordinates = self._owners(np.asarray(Q, float), tables)
 
     @staticmethod
-    def _heads(tables: Sequence[tuple[Array, Sequence[str]]], size: int) -> tuple[Array, Array]:
+    def _heads(tables: Sequence[Elements], size: int) -> tuple[Array, Array]:
         """The entry that stands for the node of each entry of a configuration, and which of them are points."""
         head, point = np.arange(size), np.zeros(size, bool)
-        for rows, labels in tables:
-            at = {label: row for row, label in zip(rows, labels, strict=True)}
+        for table in tables:
+            at = dict(zip(table.labels, table.rows, strict=True))
             for label, row in at.items():
                 name, _, axis = label.partition(".")
                 x = at.get(f"{name}.x" if axis else f"x{name[1:]}.x")
@@ -156,7 +157,7 @@ class System:
                     point[x] = True
         return head, point
 
-    def _owners(self, Q: Array, tables: Sequence[tuple[Array, Sequence[str]]]) -> tuple[Array, Array | None]:
+    def _owners(self, Q: Array, tables: Sequence[Elements]) -> tuple[Array, Array | None]:
         """The node of each unknown (active,), and coordinates of the nodes (nodes, 3) if all have some."""
         head, point = self._heads(tables, self.size)
         heads, nodes = np.unique(head[self.active], return_inverse=True)

@@ -9,15 +9,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from yarnverify.kernels.batch import upper
+from yarnverify.kernels.runtime import Kernel
+from yarnverify.kernels.tape import Trace, Traced
 
 Array = NDArray[Any]
+
+
+class Elements(NamedTuple):
+    """A table as the pattern sees it: rows (dofs, n), the names of the dofs, and entries of the packed Hessian that are zero."""
+
+    rows: Array
+    labels: Sequence[str]
+    zeros: frozenset[int] = frozenset()
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +56,10 @@ class Pattern:
     active
         Sorted indices of the unknowns in it.
     tables
-        For each table its rows (dofs, n) and the names of the dofs.
+        All that is summed into it.
     """
 
-    def __init__(self, size: int, active: Array, tables: Sequence[tuple[Array, Sequence[str]]]) -> None:
+    def __init__(self, size: int, active: Array, tables: Sequence[Elements]) -> None:
         self.count = len(active)
         self.local = np.full(size, -1, np.int32)  # place of each entry of the configuration among the unknowns
         self.local[active] = np.arange(self.count, dtype=np.int32)
@@ -63,14 +73,14 @@ class Pattern:
         self._block[active] = number
         self._graph(tables)
         self._spread(number)
-        self.places = [self._places(rows, labels) for rows, labels in tables]
+        self.places = [self._places(table) for table in tables]
         del self._keys, self._offset, self._row_pointer, self._widths, self._upper, self._diagonal
 
-    def _graph(self, tables: Sequence[tuple[Array, Sequence[str]]]) -> None:
+    def _graph(self, tables: Sequence[Elements]) -> None:
         """Which blocks share an element."""
         blocks = len(self._first)
         found: sparse.csr_array = sparse.eye_array(blocks, dtype=bool, format="csr")
-        for rows, labels in tables:
+        for rows, labels, _ in tables:
             heads = [self._heads(rows, group) for group in groups(labels)]
             used = [head for head in heads if (head >= 0).any()]
             if not used or not rows.shape[1]:
@@ -125,10 +135,11 @@ class Pattern:
             found = np.maximum(found, self._block[rows[k]])
         return found
 
-    def _places(self, rows: Array, labels: Sequence[str]) -> Places:
+    def _places(self, table: Elements) -> Places:
+        rows, labels, nothing = table
         local = [self.local[row] for row in rows]
         some = [bool((row >= 0).any()) for row in local]
-        pairs = [k for k, (i, j) in enumerate(upper(len(labels))) if some[i] and some[j]]
+        pairs = [k for k, (i, j) in enumerate(upper(len(labels))) if some[i] and some[j] and k not in nothing]
         at = np.empty((len(pairs), rows.shape[1]), np.int32 if self.sums < 2**31 else np.int64)
         number = {pair: k for k, pair in enumerate(upper(len(labels)))}
         target = {k: m for m, k in enumerate(pairs)}
@@ -158,11 +169,29 @@ class Pattern:
         found.has_canonical_format = True
         return found
 
+    def skew(self, sums: Array) -> sparse.csr_array:
+        """The matrix that has the summed entries above its diagonal and their negatives below."""
+        row = np.repeat(np.arange(self.count, dtype=np.int32), np.diff(self.indptr))
+        data = sums.take(self._source) * np.sign(self.indices - row)
+        return sparse.csr_array((data, self.indices, self.indptr), shape=(self.count, self.count))
+
     @cached_property
     def bytes(self) -> int:
         """Memory that it takes."""
         held = [self.local, self._block, self.indptr, self.indices, self._source, *(p.at for p in self.places)]
         return sum(a.nbytes for a in held)
+
+
+def zeros(kernel: Kernel) -> frozenset[int]:
+    """Entries of the packed Hessian that are zero whatever the element, found by following the kernel's formulas."""
+    count = len(kernel.dofs) * (len(kernel.dofs) + 1) // 2
+    found = set(range(count))
+    for shape in range(len(kernel.shapes)):
+        trace = Trace(np.dtype(float))
+        inputs = [Traced(trace, trace.node("input", i)) for i in range(len(kernel.dofs) + len(kernel.parameters))]
+        values = kernel.outputs(shape, "H")(inputs)[:count]
+        found &= {k for k, value in enumerate(values) if trace.nodes[trace.lift(value).number] == ("constant", 0.0)}
+    return frozenset(found)
 
 
 def groups(labels: Sequence[str]) -> list[list[int]]:
@@ -173,10 +202,10 @@ def groups(labels: Sequence[str]) -> list[list[int]]:
     return list(found.values())
 
 
-def _blocks(size: int, active: Array, tables: Sequence[tuple[Array, Sequence[str]]]) -> Array:
+def _blocks(size: int, active: Array, tables: Sequence[Elements]) -> Array:
     """The first entry of the block of each entry of the configuration, (size,)."""
     block = np.arange(size, dtype=np.int32)
-    for rows, labels in tables:
+    for rows, labels, _ in tables:
         for group in groups(labels):
             head = rows[group[0]]
             for k in group[1:]:

@@ -98,24 +98,35 @@ def contact(q: Array, parameters: Mapping[str, Any], packed: Array, keep: Sequen
     """Nothing to do: the Hessian is k_c L or zero times a square."""
 
 
+def gravity(q: Array, parameters: Mapping[str, Any], packed: Array, keep: Sequence[int]) -> None:
+    """Rows x0, x1, u0, u1: of ``-rho (du1 - du0) g.(dx0 + dx1)/2``, a product of two coordinates, one square remains."""
+    n = q.shape[1]
+    g = [np.broadcast_to(v, n) for v in parameters["g"]]
+    size = _length(g)
+    down = [v / np.where(size > 0, size, 1.0) * np.sqrt(0.5) for v in g]
+    rate = np.full(n, np.sqrt(0.5))
+    _squares(packed, keep, 8, [(parameters["rho"] * size / 2, [*down, *down, rate, -rate])])
+
+
 def eigenvalues(q: Array, parameters: Mapping[str, Any], packed: Array, keep: Sequence[int]) -> None:
     """Any Hessian, its negative eigenvalues taken to be zero: the nearest matrix of this kind, at some 20 us an element."""
     dof = q.shape[0]
     rows, columns = _indices(dof)
-    full = np.empty((q.shape[1], dof, dof))
-    full[:, rows, columns] = packed.T
-    full[:, columns, rows] = packed.T
+    some = np.flatnonzero(packed.any(axis=0))  # obstacles leave most elements alone
+    full = np.empty((some.size, dof, dof))
+    full[:, rows, columns] = full[:, columns, rows] = packed[:, some].T
     scale = np.abs(full).max(axis=(1, 2), initial=0)
     full /= np.where(scale > 0, scale, 1)[:, None, None]
     value, vector = np.linalg.eigh(full)
     bad = np.flatnonzero(value[:, 0] < 0)
     value, vector = np.maximum(value[bad], 0), vector[bad]
     better = (vector * value[:, None, :]) @ vector.transpose(0, 2, 1) * scale[bad, None, None]
-    packed[:, bad] = better[:, rows, columns].T
+    packed[:, some[bad]] = better[:, rows, columns].T
 
 
-FORMS: Mapping[str, Form] = {"stretch": stretch, "bending": bending, "shear": shear, "parallel_contact": contact}
-ALONE: frozenset[Form] = frozenset({bending, shear})  # those that do not look at the Hessian that they replace
+FORMS: Mapping[str, Form] = {"stretch": stretch, "bending": bending, "shear": shear, "parallel_contact": contact,
+                               "gravity": gravity}  # fmt: skip
+ALONE: frozenset[Form] = frozenset({bending, shear, gravity})  # those that do not look at the Hessian that they replace
 
 
 def form_of(kernel: Any) -> Form:
