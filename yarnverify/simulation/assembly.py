@@ -9,7 +9,8 @@ Elements go through kernel and sum a chunk at a time, in memory that is kept: no
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Any, Literal, NamedTuple
 
@@ -253,6 +254,25 @@ class System:
             if found is None or size[k] > found[0]:
                 found = float(size[k]), Worst(term.name, int(at[k]), float(e[k]), Q[rows[:, k]])
         return None if found is None else found[1]
+
+    def softened(self, factor: float) -> System:
+        """The same system, with the stiffness of stretch multiplied by a factor."""
+        soft = copy(self)
+        soft.terms = tuple(
+            replace(t, parameters={**t.parameters, "k_s": factor * t.parameters["k_s"]}) if "k_s" in t.parameters else t
+            for t in self.terms
+        )
+        return soft
+
+    def softness(self, Q: Array) -> float:
+        """The factor at which stretch is about as stiff as all other forces together are strong."""
+        stiff = [float(np.max(t.parameters["k_s"])) for t in self.terms if "k_s" in t.parameters and t.table.count]
+        if not stiff:
+            return 1.0
+        others = copy(self)
+        others.terms = tuple(t for t in self.terms if "k_s" not in t.parameters)
+        held = others.slope(Q)[self.active]
+        return min(1.0, 3 * float(np.abs(held).sum()) / max(stiff))
 
     # -- how
 

@@ -86,6 +86,14 @@ class Increment:
         """The element of the greatest residual."""
         return self.inertia.system.worst(self.at(Q))
 
+    def softness(self, Q: Array) -> float:
+        """One: inertia keeps a step from creeping."""
+        return 1.0
+
+    def softened(self, factor: float) -> Increment:
+        """Itself."""
+        return self
+
     # -- the residual, for any mass
 
     def residual(self, Q: Array) -> tuple[Array, float]:

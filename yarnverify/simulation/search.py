@@ -44,6 +44,12 @@ class Problem(Protocol):
     def worst(self, Q: Array) -> Worst | None:
         """The element of the greatest residual."""
 
+    def softness(self, Q: Array) -> float:
+        """The factor by which stretch would have to be softer to be no stiffer than the rest; 1 where it is not."""
+
+    def softened(self, factor: float) -> Problem:
+        """The problem with softer stretch."""
+
 
 class Iteration(NamedTuple):
     """One iteration: energy, J; greatest entry of the gradient; of the step, m; how the step was made."""
@@ -149,19 +155,21 @@ class Search:
     solver: Solver | None
     report: Callable[[Iteration], None] | None
     options: Options
+    returns: int = 1000  # how often it may go back to the best state before it gives up
+    searching: int = 0  # line searches still to be made
     history: list[Iteration] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=lambda: {"evaluation": 0.0, "solve": 0.0})
     departures: int = 0
-    searching: int = 0
-    careful: bool = False  # whether the search has started again because the energy had risen
 
     def run(self) -> Equilibrium:
         """Iterate to the end."""
-        self._start_again(self.Q)
-        start, start_energy = self.Q.copy(), np.inf
-        while len(self.history) < self.options.iterations:
+        self._lowest, self._lowest_energy = self.Q.copy(), np.inf
+        self._start_again(self.Q, self.searching)
+        ceiling, first = np.inf, True  # energy that the end must not exceed
+        while len(self.history) < self.options.iterations and self.returns >= 0:
             value = self._evaluate(False)
-            start_energy = value.energy if not self.history else start_energy
+            ceiling = min(ceiling, value.energy) if first else ceiling
+            first = False
             progress = self._remember(value)
             factor, step = None, np.zeros(0)
             rest = float(np.abs(value.gradient).max(initial=0.0)) <= self.options.residual * value.force
@@ -173,11 +181,9 @@ class Search:
                 if departure is not None:
                     self.departures += 1
                     self._note(value, float(np.abs(departure - self.Q).max()), "departure")
-                    self._start_again(departure, searches=3)
-                elif value.energy > start_energy + 1e-9 * abs(start_energy) and not (self.careful or self.departures):
-                    self.careful = True
-                    self._note(value, 0.0, "return")
-                    self._start_again(start, searches=20)
+                    self._start_again(departure, 3)
+                elif value.energy > ceiling + 1e-9 * abs(ceiling):
+                    self._return(value)
                 else:
                     self._note(value, 0.0, "end")
                     return Equilibrium(self.Q, value.energy, self.history, negative, self.departures, self.seconds)
@@ -186,28 +192,36 @@ class Search:
             progress |= size < 0.5 * self._step
             self._step = min(size, self._step)
             self._stale = 0 if progress or self.searching else self._stale + 1
-            if self._stale > self.options.patience:
-                self._note(value, 0.0, "return")
-                self._start_again(self._best, searches=15)
+            self._fulls += not self.searching
+            if self._stale > self.options.patience or self._fulls > 6 * self.options.patience:
+                self._return(value)
             elif self.searching:
                 self.searching -= 1
                 self._note(value, self._search(value, step), "search")
             else:
                 self._note(value, self._full(step), "full")
-        worst = self.problem.worst(self._best)
-        raise NotConverged(f"no equilibrium after {len(self.history)} iterations", self._best, self.history, worst)
+        worst = self.problem.worst(self._lowest)
+        raise NotConverged(f"no equilibrium after {len(self.history)} iterations", self._lowest, self.history, worst)
 
     # -- the course of a search
 
-    def _start_again(self, Q: Array, searches: int = 0) -> None:
+    def _start_again(self, Q: Array, searches: int) -> None:
         self.Q, self._next = Q.copy(), None
-        self._best, self._energy, self._step, self._stale, self.searching = self.Q.copy(), np.inf, np.inf, 0, searches
+        self._energy, self._step, self._stale, self._fulls = np.inf, np.inf, 0, 0
+        self._residual, self.searching = np.inf, searches
+
+    def _return(self, value: Evaluation) -> None:
+        self._note(value, 0.0, "return")
+        self.returns -= 1
+        self._start_again(self._lowest, 15)
 
     def _remember(self, value: Evaluation) -> bool:
-        """Keep the best state; whether the energy has decreased."""
+        """Keep the best state; whether the energy has decreased since the last start."""
+        if value.energy < self._lowest_energy:
+            self._lowest, self._lowest_energy = self.Q.copy(), value.energy
         if not value.energy < self._energy:
             return False
-        self._best, self._energy = self.Q.copy(), value.energy
+        self._energy = value.energy
         return True
 
     def _note(self, value: Evaluation, step: float, kind: Any) -> None:
@@ -223,8 +237,12 @@ class Search:
             return True
         if size > 1e-7 * extent:
             return False
-        noise = 4 * EPSILON * (abs(value.matrix) @ np.abs(self.Q[self.problem.active]))
-        return bool((np.abs(value.gradient) <= np.maximum(noise, self.options.residual * value.force)).all())
+        found = np.abs(value.gradient)
+        before, self._residual = self._residual, float(found.max())
+        noise = EPSILON * (abs(value.matrix) @ np.abs(self.Q[self.problem.active]))
+        if (found <= np.maximum(noise, self.options.residual * value.force)).all():
+            return True
+        return bool((found <= 8 * noise).all()) and self._residual > 0.5 * before
 
     # -- steps
 
@@ -239,7 +257,7 @@ class Search:
         known, self._next = self._next, None
         value = self._timed(self.Q, definite) if known is None or definite else known
         if not np.isfinite(value.gradient).all():
-            raise NotConverged("the gradient is not finite", self._best, self.history, None)
+            raise NotConverged("the gradient is not finite", self._lowest, self.history, None)
         return value
 
     def _direction(self, value: Evaluation) -> tuple[Factor | None, Array]:
@@ -257,11 +275,16 @@ class Search:
             try:
                 factor = self._factorise(matrix + shift * sparse.eye_array(matrix.shape[0], format="csc") if shift else matrix)
                 if not factor.negative:
-                    return None, self._solve(factor, -value.gradient)
+                    return None, self._short(self._solve(factor, -value.gradient))
             except LinearSolveError:
                 pass
             shift = max(10 * shift, 1e-11 * size)
-        raise NotConverged("no descent direction", self._best, self.history, self.problem.worst(self.Q))
+        raise NotConverged("no descent direction", self._lowest, self.history, self.problem.worst(self.Q))
+
+    def _short(self, step: Array) -> Array:
+        """A step of at most the extent: a form without negative curvature may have none at all in some directions."""
+        size, extent = float(np.abs(step).max()), float(np.ptp(self.Q))
+        return step * (extent / size) if size > extent else step
 
     def _factorise(self, matrix: Any) -> Factor:
         if self.solver is None:
@@ -307,7 +330,7 @@ class Search:
                 continue
             self.Q = Q
             return share * float(np.abs(step).max())
-        raise NotConverged("no step is possible", self._best, self.history, self.problem.worst(self.Q))
+        raise NotConverged("no step is possible", self._lowest, self.history, self.problem.worst(self.Q))
 
     def _search(self, value: Evaluation, step: Array) -> float:
         """A step that decreases the energy enough (Armijo), by halving."""

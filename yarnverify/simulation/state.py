@@ -54,7 +54,7 @@ def save(path: str | os.PathLike[str], *, identity: str = "", **arrays: ArrayLik
     try:
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
             temporary = Path(file.name)
-            np.savez(file, allow_pickle=False, **{"format": FORMAT, "identity": identity, **arrays})
+            np.savez(file, **{"format": FORMAT, "identity": identity, **arrays})
             file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, path)
