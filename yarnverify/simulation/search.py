@@ -21,10 +21,13 @@ from scipy import sparse
 from yarnverify.kernels import ElementError
 from yarnverify.simulation.assembly import Evaluation, Worst
 from yarnverify.simulation.linear import Banded, Factor, LinearSolveError, Multifrontal, Solver
-from yarnverify.simulation.stability import negative_direction
+from yarnverify.simulation.linear.threads import one_thread
+from yarnverify.simulation.stability import downhill, negative_direction
 
 Array = NDArray[Any]
 EPSILON = float(np.finfo(float).eps)
+FEW = 4  # negative eigenvalues up to which their directions are found one by one
+NEAR = 0.1  # of the extent: the length of a step within which its negative directions mean a saddle
 NARROW = 24  # band up to which banded Cholesky beats fronts
 
 
@@ -161,6 +164,7 @@ class Search:
     seconds: dict[str, float] = field(default_factory=lambda: {"evaluation": 0.0, "solve": 0.0})
     departures: int = 0
 
+    @one_thread()
     def run(self) -> Equilibrium:
         """Iterate to the end."""
         self._lowest, self._lowest_energy = self.Q.copy(), np.inf
@@ -261,11 +265,15 @@ class Search:
         return value
 
     def _direction(self, value: Evaluation) -> tuple[Factor | None, Array]:
-        """Newton's step, with the semi-definite form of the Hessian where it is not positive definite itself."""
+        """Newton's step; near a saddle with negative directions turned round, else with a semi-definite form of the Hessian."""
         try:
             factor = self._factorise(value.matrix)
-            if not factor.negative:
-                return factor, self._solve(factor, -value.gradient)
+            if factor.negative is None or factor.negative <= FEW:
+                step = self._solve(factor, -value.gradient)
+                if not factor.negative:
+                    return factor, step
+                if float(np.abs(step).max()) < NEAR * float(np.ptp(self.Q)):
+                    return factor, self._short(downhill(value.matrix, factor, step))
         except LinearSolveError:
             pass
         matrix = self._evaluate(True).matrix

@@ -14,26 +14,40 @@ Array = NDArray[Any]
 SMALL = 200  # unknowns up to which all eigenvalues cost next to nothing
 
 
-def negative_direction(matrix: Any, factor: Factor | None) -> Array | None:
-    """A direction v, greatest entry 1, in which a symmetric matrix is negative: v.A v < 0 beyond rounding; None if none is found.
+def lowest(matrix: Any, factor: Factor, count: int) -> Array:
+    """Unit eigenvectors of the lowest eigenvalues of a small matrix, else of the negative ones nearest to zero; (n, count).
 
-    Parameters
-    ----------
-    factor
-        Of the matrix, for inverse iteration; without it only small matrices are looked at.
+    Raises
+    ------
+    LinearSolveError
+        They were not found.
     """
     n = matrix.shape[0]
     if n <= SMALL:
-        v = np.linalg.eigh(matrix.toarray())[1][:, 0]
-    elif factor is None:
+        return np.linalg.eigh(matrix.toarray())[1][:, :count]
+    inverse = LinearOperator((n, n), matvec=factor.solve, dtype=float)
+    start = np.random.default_rng(0).normal(size=n)
+    try:  # the most negative of the inverse eigenvalues belong to the negative ones nearest to zero
+        return eigsh(matrix, k=count, sigma=0.0, which="SA", OPinv=inverse, v0=start, tol=1e-6, maxiter=300)[1]
+    except (ArpackError, ArpackNoConvergence) as error:
+        raise LinearSolveError(f"eigenvectors were not found: {error}") from None
+
+
+def downhill(matrix: Any, factor: Factor, step: Array) -> Array:
+    """Newton's step with its part along negative directions turned round, so that it leads away from saddles."""
+    assert factor.negative
+    vectors = lowest(matrix, factor, factor.negative)
+    return step - 2 * vectors @ (vectors.T @ step)
+
+
+def negative_direction(matrix: Any, factor: Factor | None) -> Array | None:
+    """A direction v, greatest entry 1, in which a symmetric matrix is negative: v.A v < 0 beyond rounding; None if none is found."""
+    if factor is None:
         return None
-    else:
-        inverse = LinearOperator((n, n), matvec=factor.solve, dtype=float)
-        start = np.random.default_rng(0).normal(size=n)
-        try:  # the most negative of the inverse eigenvalues is the negative one nearest to zero
-            v = eigsh(matrix, k=1, sigma=0.0, which="SA", OPinv=inverse, v0=start, tol=1e-4, maxiter=300)[1][:, 0]
-        except (ArpackError, ArpackNoConvergence, LinearSolveError):
-            return None
+    try:
+        v = lowest(matrix, factor, 1)[:, 0]
+    except LinearSolveError:
+        return None
     return v / v[np.argmax(np.abs(v))] if is_negative(matrix, v) else None
 
 
