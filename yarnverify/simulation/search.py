@@ -203,7 +203,7 @@ class Search:
                 self.searching -= 1
                 self._note(value, self._search(value, step), "search")
             else:
-                self._note(value, self._full(step), "full")
+                self._note(value, self._full(value, step), "full")
         worst = self.problem.worst(self._lowest)
         raise NotConverged(f"no equilibrium after {len(self.history)} iterations", self._lowest, self.history, worst)
 
@@ -326,19 +326,15 @@ class Search:
         finally:
             self.seconds["evaluation"] += perf_counter() - start
 
-    def _full(self, step: Array) -> float:
-        """The full step, or the greatest half of a half of it at which all elements have derivatives."""
-        share = 1.0
-        for _ in range(40):
-            Q = self._at(step, share)
-            try:
-                self._next = self._timed(Q, False)
-            except ElementError:
-                share /= 2
-                continue
-            self.Q = Q
-            return share * float(np.abs(step).max())
-        raise NotConverged("no step is possible", self._lowest, self.history, self.problem.worst(self.Q))
+    def _full(self, value: Evaluation, step: Array) -> float:
+        """The full step, or a search where it leads out of the domain of an element."""
+        Q = self._at(step, 1.0)
+        try:
+            self._next = self._timed(Q, False)
+        except ElementError:
+            return self._search(value, step)
+        self.Q = Q
+        return float(np.abs(step).max())
 
     def _search(self, value: Evaluation, step: Array) -> float:
         """A step that decreases the energy enough (Armijo), by halving."""
@@ -351,7 +347,7 @@ class Search:
                 self.Q = Q
                 return share * float(np.abs(step).max())
             share /= 2
-        return self._full(step)
+        return 0.0  # there is nothing to be gained in this direction
 
     def _stability(self, value: Evaluation, factor: Factor | None) -> tuple[Array | None, int | None]:
         """A state of lower energy beside an unstable equilibrium, and else the number of negative eigenvalues."""
