@@ -15,6 +15,7 @@ def theta(x0: Point, x1: Point, x2: Point):
     removable=r"\theta = 0",
     singular=r"\theta = \pi",
     rest={"x0": (0, 0, 0), "x1": (1, 0, 0), "x2": (-1, 0, 0), "u1": 1, "u2": -1},
+    unchanged=("translation", "rotation", "sliding"),
 )
 def bending(x0: Point, x1: Point, x2: Point, u1: Sliding, u2: Sliding, *, k_b: Positive["N m^2"]):
     """Turning angle squared over the yarn length that it is spread on."""

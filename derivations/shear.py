@@ -13,6 +13,7 @@ def phi(x0: Point, x1: Point, x3: Point):
     unit="J",
     singular=r"\phi = 0, \phi = \pi",
     rest={"x0": (0, 0, 0), "x1": (1, 0, 0), "x3": (0, 1, 0)},
+    unchanged=("translation", "rotation"),
 )
 def shear(x0: Point, x1: Point, x3: Point, *, k_x: Positive["N"], L: Positive["m"]):
     """Half the shear stiffness times the squared deviation from the right angle."""

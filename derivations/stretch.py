@@ -8,6 +8,7 @@ from yarnverify.symbolic.declare import Point, Positive, Sliding, energy, length
     domain=r"u_1 > u_0",
     singular=r"l_1 = 0",
     rest={"x0": (0, 0, 0), "x1": (1, 0, 0), "u0": 0, "u1": 1},
+    unchanged=("translation", "rotation", "sliding"),
 )
 def stretch(x0: Point, x1: Point, u0: Sliding, u1: Sliding, *, k_s: Positive["N"]):
     """Half the stretch stiffness times the squared strain, over the rest length that carries it."""

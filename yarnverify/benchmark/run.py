@@ -71,7 +71,7 @@ def benchmark(
     InputError
         For an unknown energy or peer, and numbers out of range.
     """
-    declared = load_declarations(derivations()).energies
+    declared = [each for each in load_declarations(derivations()).energies if each.document]
     chosen = [each for each in declared if energy in (None, each.name)]
     if not chosen:
         raise InputError(f"{energy}: no such energy; there are {', '.join(each.name for each in declared)}")

@@ -10,13 +10,17 @@
     bending.packed(q, k_b=...)              the same with the upper triangle only, for assembly
 
 The default variant is ``accurate``; the packages ``yarnverify.kernels.fast`` and so on hold the others, all with the same
-interface. Generated modules hold straight-line formulas over ``geometry`` (safe atoms); ``batch`` runs them by way of ``tape``
+interface; energies that the document does not print (gravity, kinetic energy, obstacles) have ``accurate``, ``fast`` and
+``reference``.
+Generated modules hold straight-line formulas over ``geometry`` (safe atoms); ``batch`` runs them by way of ``tape``
 (chunks of NumPy calls), ``doubledouble`` or ``compiled`` (numba).
 """
 
-from yarnverify.kernels import bending, parallel_contact, shear, stretch
+from yarnverify.kernels import bending, gravity, kinetic, parallel_contact, plane, shear, sphere, stretch
 from yarnverify.kernels.runtime import ElementError
 
 VARIANTS = ("accurate", "fast", "reference", "differentiated", "printed")
 
-__all__ = ["VARIANTS", "ElementError", "bending", "parallel_contact", "shear", "stretch"]
+__all__ = [
+    "VARIANTS", "ElementError", "bending", "gravity", "kinetic", "parallel_contact", "plane", "shear", "sphere", "stretch",
+]  # fmt: skip

@@ -54,7 +54,10 @@ def rows_of(kernel: Kernel, q: ArrayLike) -> Array:
 def parameters_of(kernel: Kernel, given: Values, n: int, dtype: Any) -> tuple[Any, ...]:
     values = []
     for name, positive, _ in kernel.parameters:
-        value = np.asarray(given[name])
+        vector, _, axis = name.rpartition("_")
+        value = (
+            _component(kernel, vector, given[vector], axis, n) if vector in kernel.vectors else np.asarray(given[name])
+        )
         if value.dtype.kind not in "iubf":
             raise TypeError(f"{kernel.name}: {name} must be real, not {value.dtype}")
         if value.shape not in ((), (n,)):
@@ -68,6 +71,15 @@ def parameters_of(kernel: Kernel, given: Values, n: int, dtype: Any) -> tuple[An
             )
         values.append(value.astype(dtype))
     return tuple(values)
+
+
+def _component(kernel: Kernel, name: str, given: ArrayLike, axis: str, n: int) -> Array:
+    """One component of a vector parameter, whose first axis is that of the components."""
+    value = np.asarray(given)
+    if value.shape not in ((3,), (3, n)):
+        raise ValueError(f"{kernel.name}: {name} must have shape (3,) or (3, {n}), not {value.shape}")
+    found: Array = value["xyz".index(axis)]
+    return found
 
 
 def complain(kernel: Kernel, elements: Array, reasons: Mapping[int, str]) -> None:

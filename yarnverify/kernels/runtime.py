@@ -70,7 +70,10 @@ class Kernel:
     name, dofs
         The energy, and the names of the rows of ``q``.
     parameters
-        Name, whether it must not be negative, and its power of length (scaling all lengths scales it so).
+        Name, whether it must not be negative, and its power of length (scaling all lengths scales it so); of a vector the
+        name of each component, such as ``g_x``.
+    vectors, velocities
+        Names of the parameters with three components, and of the unknowns that are velocities of points.
     shapes
         The forms; where the first has a choice and is not the right one, the second is, or the energy is zero if there is none.
     scaling
@@ -85,6 +88,8 @@ class Kernel:
     dofs: tuple[str, ...]
     parameters: tuple[tuple[str, bool, int], ...]
     shapes: tuple[Shape, ...]
+    vectors: tuple[str, ...] = ()
+    velocities: tuple[str, ...] = ()
     scaling: Literal["points", "lengths"] = "lengths"
     portable: bool = True
     numbers: Literal["float", "double-double"] = "float"
@@ -94,7 +99,8 @@ class Kernel:
     @cached_property
     def points(self) -> tuple[int, ...]:
         """Rows that belong to points."""
-        return tuple(i for i, label in enumerate(self.dofs) if "." in label)
+        named = [label.partition(".") for label in self.dofs]
+        return tuple(i for i, (name, dot, _) in enumerate(named) if dot and name not in self.velocities)
 
     def outputs(self, shape: int, wanted: str) -> Callable[[Sequence[Any]], list[Any]]:
         """The function of one shape with its results in a row: what is wanted, margins, choice."""

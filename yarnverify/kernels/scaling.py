@@ -28,6 +28,8 @@ def exponents(kernel: Kernel, rows: Array, limit: float) -> Array:
     if not kernel.points or not kernel.portable:
         return np.zeros(rows.shape[1], int)
     points = rows[list(kernel.points)].reshape(-1, 3, rows.shape[1])
+    if len(points) < 2:  # no edge that could give the scale
+        return np.zeros(rows.shape[1], int)
     spans = np.abs(points[1:] - points[:1]).max(axis=1)
     span = spans.max(axis=0)
     if kernel.scaling == "points":

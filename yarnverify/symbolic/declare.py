@@ -35,12 +35,24 @@ class Sliding:
     """Annotation of an unknown sliding coordinate: rest arc length along a yarn, in metres."""
 
 
+class Velocity:
+    """Annotation of the velocity of a point: three components, in metres per second."""
+
+
+class SlidingSpeed:
+    """Annotation of the velocity of a sliding coordinate, in metres per second."""
+
+
+_KINDS = {Point: (True, "m"), Sliding: (False, "m"), Velocity: (True, "m s^-1"), SlidingSpeed: (False, "m s^-1")}
+
+
 @dataclass(frozen=True)
 class Real:
     """Annotation of a parameter of any sign: ``Real["rad"]``."""
 
     unit: str
     positive: bool = False
+    vector: bool = False
 
     def __class_getitem__(cls, unit: str) -> Real:
         return cls(unit)
@@ -53,9 +65,21 @@ class Positive:
         return Real(unit, positive=True)
 
 
+class Vector:
+    """Annotation of a parameter with three components of any sign: ``Vector["m s^-2"]``."""
+
+    def __class_getitem__(cls, unit: str) -> Real:
+        return Real(unit, vector=True)
+
+
 def length(a: Expr) -> Expr:
     """Length of a vector."""
     return Expr("norm", (a,))
+
+
+def square(a: Expr) -> Expr:
+    """Square of the length of a vector."""
+    return Expr("mul", (a.T, a))
 
 
 def unit(a: Expr) -> Expr:
@@ -97,8 +121,8 @@ class Energy:
     ----------
     name, document, section, unit, summary
         What it is, and which section of which document prints it.
-    unknowns, parameters
-        In the order of the function's signature.
+    unknowns, units, parameters
+        In the order of the function's signature; ``units`` are those of the unknowns.
     expression
         The energy itself.
     domain
@@ -108,6 +132,8 @@ class Energy:
         One state of least energy: a value for each unknown (3 for a point), and 1 for each parameter not named.
     elsewhere
         What holds outside the domain: ``error``, or ``zero`` for an energy that does not act there.
+    unchanged
+        Motions that leave the energy as it is: ``translation``, ``rotation``, ``sliding`` (all sliding coordinates together).
     """
 
     name: str
@@ -116,6 +142,7 @@ class Energy:
     unit: str
     summary: str
     unknowns: tuple[Name, ...]
+    units: tuple[str, ...]
     parameters: tuple[Parameter, ...]
     expression: Expr
     domain: tuple[Assumption, ...] = ()
@@ -123,6 +150,17 @@ class Energy:
     singular: str = ""
     rest: dict[str, Any] = field(default_factory=dict)
     elsewhere: str = "error"
+    unchanged: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion that leaves an energy as it is: the rate of each unknown that moves, which may depend on the state."""
+
+    energy: str
+    name: str
+    summary: str
+    rates: tuple[tuple[Name, Expr], ...]
 
 
 @dataclass(frozen=True)
@@ -156,9 +194,11 @@ def _unknowns(function: Callable[..., Any], hints: dict[str, Any]) -> dict[str, 
     for key, parameter in inspect.signature(function).parameters.items():
         if parameter.kind is parameter.KEYWORD_ONLY:
             continue
-        if hints.get(key) not in (Point, Sliding):
-            raise TypeError(f"argument {key!r} of {function.__name__} must be annotated Point or Sliding")
-        found[key] = Expr("symbol", value=name_of(key, hints[key] is Point, indexed=True))
+        if hints.get(key) not in _KINDS:
+            raise TypeError(
+                f"argument {key!r} of {function.__name__} must be annotated Point or Sliding, Velocity or SlidingSpeed"
+            )
+        found[key] = Expr("symbol", value=name_of(key, _KINDS[hints[key]][0], indexed=True))
     return found
 
 
@@ -170,9 +210,10 @@ def _parameters(function: Callable[..., Any], hints: dict[str, Any]) -> dict[str
         kind = hints.get(key)
         if not isinstance(kind, Real):
             raise TypeError(
-                f'parameter {key!r} of {function.__name__} must be annotated Positive["unit"] or Real["unit"]'
+                f"parameter {key!r} of {function.__name__} must be annotated "
+                'Positive["unit"], Real["unit"] or Vector["unit"]'
             )
-        found[key] = Parameter(name_of(key), kind.unit, kind.positive)
+        found[key] = Parameter(name_of(key, kind.vector), kind.unit, kind.positive)
     return found
 
 
@@ -212,6 +253,7 @@ def energy(
     singular: str = "",
     rest: dict[str, Any] | None = None,
     elsewhere: Literal["error", "zero"] = "error",
+    unchanged: tuple[Literal["translation", "rotation", "sliding"], ...] = (),
 ) -> Callable[[Callable[..., Expr]], Energy]:
     """Declare an energy; see the module's example and ``Energy`` for what the options mean."""
 
@@ -233,8 +275,9 @@ def energy(
             raise TypeError(f"{name}: an energy is a scalar, and this is a {kind.value}")
         return Energy(
             name, document, section, unit, inspect.getdoc(function) or "",
-            tuple(node.name for node in unknowns.values()), tuple(parameters.values()),
-            expression, tuple(where), removable, singular, rest or {}, elsewhere,
+            tuple(node.name for node in unknowns.values()), tuple(_KINDS[hints[key]][1] for key in unknowns),
+            tuple(parameters.values()),
+            expression, tuple(where), removable, singular, rest or {}, elsewhere, unchanged,
         )  # fmt: skip
 
     return declare
@@ -256,12 +299,27 @@ def quantity(
     return declare
 
 
+def unchanged_by(energy: Energy) -> Callable[[Callable[..., dict[str, Expr | int]]], Motion]:
+    """Declare a motion that leaves an energy as it is: a function of unknowns that gives the rate of each that moves."""
+
+    def declare(function: Callable[..., dict[str, Expr | int]]) -> Motion:
+        labels = {name.label: name for name in energy.unknowns}
+        rates = function(**_unknowns(function, get_type_hints(function)))
+        if strange := set(rates) - set(labels):
+            raise ValueError(f"{function.__name__}: {energy.name} has no unknown {', '.join(sorted(strange))}")
+        moves = tuple((labels[label], as_expr(rate)) for label, rate in rates.items())
+        return Motion(energy.name, function.__name__.replace("_", " "), inspect.getdoc(function) or "", moves)
+
+    return declare
+
+
 @dataclass(frozen=True)
 class Declarations:
     """All that one folder of derivations declares."""
 
     energies: tuple[Energy, ...] = ()
     quantities: tuple[Quantity, ...] = ()
+    motions: tuple[Motion, ...] = ()
 
 
 def load_declarations(folder: Path) -> Declarations:
@@ -274,6 +332,7 @@ def load_declarations(folder: Path) -> Declarations:
     """
     energies: dict[str, Energy] = {}
     quantities: list[Quantity] = []
+    motions: list[Motion] = []
     for path in sorted(path for path in folder.glob("*.py") if path.is_file()):
         namespace: dict[str, Any] = {"__name__": path.stem, "__file__": str(path)}
         try:
@@ -292,10 +351,13 @@ def load_declarations(folder: Path) -> Declarations:
                 energies[value.name] = value
             elif isinstance(value, Quantity):
                 quantities.append(value)
-    return Declarations(tuple(energies.values()), tuple(quantities))
+            elif isinstance(value, Motion):
+                motions.append(value)
+    return Declarations(tuple(energies.values()), tuple(quantities), tuple(motions))
 
 
 __all__ = [
-    "Assumption", "Declarations", "Energy", "Parameter", "Point", "Positive", "Quantity", "Real", "Sliding",
-    "angle", "assumptions", "deviation", "energy", "length", "load_declarations", "name_of", "quantity", "unit",
+    "Assumption", "Declarations", "Energy", "Motion", "Parameter", "Point", "Positive", "Quantity", "Real", "Sliding",
+    "SlidingSpeed", "Vector", "Velocity", "angle", "assumptions", "deviation", "energy", "length", "load_declarations",
+    "name_of", "quantity", "square", "unchanged_by", "unit",
 ]  # fmt: skip

@@ -79,7 +79,8 @@ class Components(Reading):
         if self.section.is_unknown(name):
             symbols = row_symbols(name)
             return symbols if name.bold else symbols[0]
-        return sp.Symbol(identifier(name), real=True)
+        found = given_symbols(name)
+        return found if name.bold else found[0]
 
     def sqrt(self, value: Any) -> Any:
         return sp.sqrt(value)

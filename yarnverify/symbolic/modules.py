@@ -22,6 +22,7 @@ from yarnverify.symbolic.emit import (
     LIBRARY,
     Program,
     dof_labels,
+    given_symbols,
     identifier,
     plain_program,
     program,
@@ -29,12 +30,14 @@ from yarnverify.symbolic.emit import (
     text_of,
     used_functions,
 )
+from yarnverify.symbolic.invariants import prove_invariants
 from yarnverify.symbolic.measures import NoMeasuresError
 from yarnverify.symbolic.prove import read_with
 from yarnverify.symbolic.reading import UnsupportedError
 from yarnverify.symbolic.repair import Workshop
 from yarnverify.symbolic.safe import Safe, safe_shapes
 from yarnverify.symbolic.safe_program import safe_program
+from yarnverify.symbolic.sums import Stages, is_rational
 from yarnverify.symbolic.tree import FORCE, Expr
 
 SUMMARY = {
@@ -45,6 +48,7 @@ SUMMARY = {
     "printed": "the document's own formulas, misprints included",
 }
 VARIANTS = tuple(SUMMARY)
+_PLAIN_SUMS = "no measures here: plain sums, formed once, which lose only what the rounding of their terms explains"
 _SERIES_TOP, _SERIES_DEGREE = Fraction(97, 500), 13  # sin(t/4)^2 is 0.1939 where cos t = -1/4
 
 
@@ -59,14 +63,15 @@ def kernel_modules(
         If a derived block is not proved, or the document lacks a formula that its variant needs.
     """
     declarations = load_declarations(folder)
-    energies = [energy for energy in declarations.energies if energy.document == document]
+    energies = [energy for energy in declarations.energies if energy.document in (document, "")]
+    planned = [(energy, variant) for energy in energies for variant in variants_of(energy)]
     printed = read_with(load(folder / document), declarations)
     texts: dict[str, str] = {"series.py": series_module()}
     record: dict[str, Any] = {}
     for energy in energies:
         derived = proved(energy, declarations)
-        for variant in VARIANTS:
-            advance(f"{energy.name}, {variant}", len(VARIANTS) * len(energies))
+        for variant in variants_of(energy):
+            advance(f"{energy.name}, {variant}", len(planned))
             if variant == "printed":
                 made, notes = printed_program(energy, printed)
                 programs = [made]
@@ -74,11 +79,17 @@ def kernel_modules(
                 programs, notes = derived_programs(energy, derived, variant)
             text, counts = module_text(energy, variant, programs, document, notes)
             texts[f"{variant}/{energy.name}.py"] = text
-            record.setdefault(energy.name, {})[variant] = counts
+            if energy.document:
+                record.setdefault(energy.name, {})[variant] = counts
         texts[f"{energy.name}.py"] = _face(energy, default)
     for variant in SUMMARY:
         texts[f"{variant}/__init__.py"] = f'"""Variant ``{variant}``: {SUMMARY[variant]}. Generated."""\n'
     return dict(sorted(texts.items())), record
+
+
+def variants_of(energy: Energy) -> tuple[str, ...]:
+    """The variants that an energy has: those for comparison with the document only where one prints it."""
+    return VARIANTS if energy.document else ("accurate", "fast", "reference")
 
 
 def series_module() -> str:
@@ -95,10 +106,19 @@ def series_module() -> str:
 
 @dataclass(frozen=True)
 class Proved:
-    """What an energy's kernels are made of: its derivation, if it is a law of measures, and its safe shapes; all proved."""
+    """What an energy's kernels are made of, all of it proved.
 
-    derivation: Derivation | None
-    shapes: tuple[Safe, ...]
+    Attributes
+    ----------
+    derivation, shapes
+        Of a law of measures: its derivation, and its safe shapes.
+    stages
+        Of an energy that is rational in its coordinates.
+    """
+
+    derivation: Derivation | None = None
+    shapes: tuple[Safe, ...] = ()
+    stages: Stages | None = None
 
 
 def proved(energy: Energy, declarations: Declarations) -> Proved:
@@ -109,9 +129,16 @@ def proved(energy: Energy, declarations: Declarations) -> Proved:
     NotRunError
         If a derived block is not proved.
     """
+    _require_proofs(energy.name, prove_invariants(energy, declarations.motions))
     derivation = derive_declared(energy, declarations.quantities)
     if derivation is None:
-        return Proved(None, ())
+        section = declared_section(energy)
+        if not is_rational(energy, section):
+            return Proved()
+        stages = Stages(energy, section)
+        if wrong := stages.prove():
+            raise NotRunError(f"{energy.name}: derivatives by {', '.join(wrong)} are not those of the energy")
+        return Proved(stages=stages)
     _require_proofs(energy.name, derivation.check())
     shapes: tuple[Safe, ...] = ()
     with suppress(NoMeasuresError):
@@ -123,6 +150,8 @@ def proved(energy: Energy, declarations: Declarations) -> Proved:
 
 def derived_programs(energy: Energy, found: Proved, variant: str) -> tuple[list[Program], list[str]]:
     """The programs of a derived variant, and notes on what is not as wished."""
+    if found.stages is not None:
+        return [found.stages.program()], [_PLAIN_SUMS] if variant == "accurate" else []
     if found.derivation is None:
         return [plain_program(energy, declared_section(energy))], [
             "this energy is no law of known measures: plain differentiation, nothing is done for its singular states"
@@ -149,7 +178,7 @@ def derived_programs(energy: Energy, found: Proved, variant: str) -> tuple[list[
 def _require_proofs(what: str, found: dict[str, Finding]) -> None:
     for block, finding in found.items():
         if finding.verdict is not Verdict.PROVED:
-            raise NotRunError(f"{what}: derived block {block} is {finding.verdict}: {finding.reason}")
+            raise NotRunError(f"{what}: {block} is {finding.verdict}: {finding.reason}")
 
 
 def derived_program(energy: Energy, derivation: Derivation) -> Program:
@@ -227,7 +256,7 @@ def _face(energy: Energy, default: str) -> str:
 
 
 def _title(energy: Energy) -> str:
-    return energy.section or energy.name.replace("_", " ")
+    return energy.section or energy.name.replace("_", " ").capitalize()
 
 
 def module_text(
@@ -256,7 +285,16 @@ def module_text(
         "dofs": _tuple(dofs),
         "parameters": _tuple(names),
         "names": names,
-        "powers": [length_power(parameter.unit) for parameter in energy.parameters],
+        "scalars": [
+            (str(symbol), parameter.positive, length_power(parameter.unit))
+            for parameter in energy.parameters
+            for symbol in given_symbols(parameter.name)
+        ],
+        "vectors": _tuple(identifier(p.name) for p in energy.parameters if p.name.bold),
+        "velocities": _tuple(
+            n.label for n, unit in zip(energy.unknowns, energy.units, strict=True) if n.bold and unit != "m"
+        ),
+        "row_units": row_units(energy),
         "rows": len(dofs),
         "unpack": ", ".join(labels) + ("," if len(labels) == 1 else ""),
         "functions": functions,
@@ -302,16 +340,27 @@ def _operations(text: str, name: str) -> dict[str, dict[str, int]]:
 
 
 def length_power(unit: str) -> int:
-    """The power of length in a unit such as ``N m^2``, the newton taken as a base unit."""
+    """The power of length in a unit such as ``N m^2``; newton and second are the other base units, so that kg is N s^2 m^-1."""
     total = 0
     for factor in unit.split():
         base, _, exponent = factor.partition("^")
-        total += {"m": 1, "J": 1}.get(base, 0) * int(exponent or 1)
+        total += {"m": 1, "J": 1, "kg": -1}.get(base, 0) * int(exponent or 1)
     return total
+
+
+def row_units(energy: Energy) -> str:
+    """The units of the rows of ``q``, as a person would say it."""
+    found: dict[str, list[str]] = {}
+    for name, unit in zip(energy.unknowns, energy.units, strict=True):
+        found.setdefault(unit, []).append(name.label)
+    (first, _), *rest = found.items()
+    return ", ".join([first, *(f"of {' and '.join(labels)} in {unit}" for unit, labels in rest)])
 
 
 def _tuple(names: Iterable[str]) -> str:
     inner = [f'"{name}"' for name in names]
+    if not inner:
+        return "()"
     return f"({inner[0]},)" if len(inner) == 1 else f"({', '.join(inner)})"
 
 

@@ -7,7 +7,7 @@ from typing import Any, Literal, TypeAlias
 
 import sympy as sp
 
-from yarnverify.symbolic.declare import Energy
+from yarnverify.symbolic.declare import Energy, length
 from yarnverify.symbolic.emit import (
     Check,
     Components,
@@ -60,6 +60,8 @@ def safe_program(
         checks.append((_symbol(segment.l.name), "energy", zero_length((segment.tail, segment.head))))
     checks += domain_checks(energy, reading)
     choice = active(energy, reading)
+    if choice is not None:
+        choice = choice.xreplace({reading.value(length(s.vector)): _symbol(s.l.name) for s in segments})
     if safe.corner is not None and safe.shape == "smooth" and not alone:
         choice = _SMOOTH_UP_TO - _symbol(safe.corner.name("C"))
     if safe.corner is not None and safe.shape == "polar":
@@ -154,7 +156,8 @@ class Sums:
             value.args, key=lambda term: (term.as_coeff_Mul()[1] not in self.lengths, str(term.as_coeff_Mul()[1]))
         )
         measured = self._measured(value)
-        low = sum((factor * self.lengths[symbol][0] for symbol, factor in measured), sp.S.Zero)
+        kept = measured if self.digits != "plain" else []
+        low = sum((factor * self.lengths[symbol][0] for symbol, factor in kept), sp.S.Zero)
         if self.digits != "twice" or not measured:
             return sp.Function("total")(low, *terms)
         lower = sum((factor * self.lengths[symbol][1] for symbol, factor in measured), sp.S.Zero)
@@ -168,8 +171,10 @@ def _prologue(safe: Safe, digits: Digits, used: set[str]) -> list[str]:
     corner = safe.corner
     points = dict.fromkeys(p for m in safe.lengths for p in (m.a.tail, m.a.head))
     points |= dict.fromkeys((corner.a.tail, corner.a.head, corner.b.head) if corner else ())
-    for point in sorted(points, key=safe.derivation.unknowns.index):
-        lines.append(f"{point.label} = {', '.join(map(str, row_symbols(point)))}")
+    unknowns = safe.derivation.unknowns
+    for point in sorted(points, key=(*unknowns, *safe.section.parameters).index):
+        components = row_symbols(point) if point in unknowns else given_symbols(point)
+        lines.append(f"{point.label} = {', '.join(map(str, components))}")
     suffix, kept = {"plain": ("", 0), "exact": ("_exact", 1), "twice": ("_twice", 2)}[digits]
     for measure in safe.lengths:
         s = measure.a

@@ -1,0 +1,320 @@
+"""From kernels and tables to the energy, gradient and sparse Hessian of a system.
+
+system = System(fabric.Q, [Term(stretch, segments(fabric), {"k_s": 100.0}), ...], active)
+energy, gradient, matrix = system.evaluate(Q)
+
+Elements go through kernel and sum a chunk at a time, in memory that is kept: no element Hessian outlives its chunk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+from yarnverify.kernels import ElementError
+from yarnverify.kernels.batch import Batch
+from yarnverify.simulation import scatter
+from yarnverify.simulation.pattern import Elements, Pattern, zeros
+from yarnverify.simulation.semidefinite import ALONE, Form, eigenvalues, form_of
+from yarnverify.simulation.tables import Table
+
+Array = NDArray[Any]
+CHUNK = 8192
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """One energy on all elements of a table.
+
+    Attributes
+    ----------
+    kernel
+        A module of ``yarnverify.kernels`` or one like it (``DOFS``, ``PARAMETERS``, ``KERNEL``, ``packed``).
+    table
+        The elements.
+    parameters
+        Values of the kernel's parameters that the table does not know, each a number or (n,).
+    name
+        The kernel's, unless given.
+    """
+
+    kernel: Any
+    table: Table
+    parameters: Mapping[str, ArrayLike] = field(default_factory=dict)
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            object.__setattr__(self, "name", self.kernel.KERNEL.name)
+        values = {**self.table.parameters, **self.parameters}
+        missing, unknown = set(self.kernel.PARAMETERS) - set(values), set(self.parameters) - set(self.kernel.PARAMETERS)
+        if missing or unknown:
+            wrong = ", ".join(sorted(missing or unknown))
+            raise ValueError(f"{self.name}: {'needs' if missing else 'has no'} parameter {wrong}")
+        object.__setattr__(self, "parameters", {k: np.asarray(values[k], float) for k in self.kernel.PARAMETERS})
+
+    def some(self, part: Any) -> dict[str, Any]:
+        """Parameters of some elements."""
+        vectors = self.kernel.KERNEL.vectors
+        return {k: v if np.ndim(v) == (k in vectors) else v[..., part] for k, v in self.parameters.items()}
+
+
+class Evaluation(NamedTuple):
+    """Energy, gradient (active,) and Hessian (active, active) of a state, and the size of the forces in it."""
+
+    energy: float
+    gradient: Array
+    matrix: sparse.csc_array
+    force: float
+
+
+class Worst(NamedTuple):
+    """The element that holds most of the greatest residual."""
+
+    term: str
+    index: int
+    energy: float
+    state: Array
+
+
+class System:
+    """Energies on a configuration of which some entries are unknown.
+
+    Parameters
+    ----------
+    Q
+        A configuration, (size,), such as the rest. Its coordinates serve to order the unknowns for direct solvers.
+    terms
+        Energies.
+    active
+        Indices of the unknowns. What is not among them is held where a configuration has it.
+    loads
+        Constant forces, (size,); their energy is ``-loads . Q``.
+    others
+        Tables that share the matrix but are summed elsewhere: the kinetic energy.
+    engine
+        ``numpy`` or ``compiled``, with the same bits.
+    definite
+        ``quick`` for the forms of ``semidefinite``, ``eigenvalues`` for the exact projection of every element.
+
+    Attributes
+    ----------
+    seconds
+        Time spent so far, by ``kernels`` and ``assembly``.
+    """
+
+    def __init__(
+        self,
+        Q: ArrayLike,
+        terms: Sequence[Term],
+        active: ArrayLike,
+        loads: ArrayLike | None = None,
+        *,
+        others: Sequence[Elements] = (),
+        engine: Literal["numpy", "compiled"] = "numpy",
+        definite: Literal["quick", "eigenvalues"] = "quick",
+    ) -> None:
+        self.size = np.size(Q)
+        self.terms = tuple(terms)
+        self.active = np.unique(np.asarray(active, np.int64))
+        if self.active.size != np.size(active):
+            raise ValueError("an unknown is listed twice among the active ones")
+        if self.active.size and not (self.active[0] >= 0 and self.active[-1] < self.size):
+            raise ValueError(f"unknowns must be indices into a configuration of {self.size} entries")
+        self.loads = np.zeros(self.size) if loads is None else np.array(loads, float)
+        if self.loads.shape != (self.size,):
+            raise ValueError(f"loads must have shape ({self.size},), not {self.loads.shape}")
+        for term in self.terms:
+            rows = term.table.rows
+            if rows.size and not (rows.min() >= 0 and rows.max() < self.size):
+                raise ValueError(f"{term.name}: an element reads beyond the configuration")
+        tables = [Elements(t.table.rows, t.kernel.DOFS, zeros(t.kernel.KERNEL)) for t in self.terms]
+        self.pattern = Pattern(self.size, self.active, [*tables, *others])
+        self.engine = engine
+        self._add = scatter.compiled() if engine == "compiled" else scatter.add
+        self._forms: list[Form] = [form_of(t.kernel) if definite == "quick" else eigenvalues for t in self.terms]
+        self._memory: dict[tuple[int, int], list[Array]] = {}
+        self.seconds = {"kernels": 0.0, "assembly": 0.0}
+        self.nodes, self.coordinates = self._owners(np.asarray(Q, float), tables)
+
+    @staticmethod
+    def _heads(tables: Sequence[Elements], size: int) -> tuple[Array, Array]:
+        """The entry that stands for the node of each entry of a configuration, and which of them are points."""
+        head, point = np.arange(size), np.zeros(size, bool)
+        for table in tables:
+            at = dict(zip(table.labels, table.rows, strict=True))
+            for label, row in at.items():
+                name, _, axis = label.partition(".")
+                x = at.get(f"{name}.x" if axis else f"x{name[1:]}.x")
+                if x is not None:  # a sliding coordinate u1 lies at the point x1
+                    head[row] = x
+                    point[x] = True
+        return head, point
+
+    def _owners(self, Q: Array, tables: Sequence[Elements]) -> tuple[Array, Array | None]:
+        """The node of each unknown (active,), and coordinates of the nodes (nodes, 3) if all have some."""
+        head, point = self._heads(tables, self.size)
+        heads, nodes = np.unique(head[self.active], return_inverse=True)
+        return nodes, Q[heads[:, None] + np.arange(3)] if point[heads].all() else None
+
+    @property
+    def count(self) -> int:
+        """Number of unknowns."""
+        return self.pattern.count
+
+    # -- what a state is worth
+
+    def energy(self, Q: Array) -> float:
+        """Total energy of a configuration (size,), J.
+
+        Raises
+        ------
+        ElementError
+            An element has none there.
+        """
+        total = self._work(Q)
+        for term, _, part, q in self._chunks(Q):
+            total += float(np.add.reduce(self._run(term, "E", q, part)[0]))
+        return total
+
+    def energies(self, Q: Array) -> dict[str, float]:
+        """Energy by the name of its term."""
+        found = {term.name: 0.0 for term in self.terms}
+        for term, _, part, q in self._chunks(Q):
+            found[term.name] += float(np.add.reduce(self._run(term, "E", q, part)[0]))
+        return found
+
+    def slope(self, Q: Array) -> Array:
+        """Derivative of the energy in every entry of a configuration, held ones too, (size,): there it is the reaction."""
+        total = np.zeros(self.size)
+        for term, _, part, q in self._chunks(Q):
+            g = self._run(term, "G", q, part)[0]
+            self._add(total, term.table.rows[:, part], g, np.arange(len(g)))
+        return total - self.loads
+
+    def gradient(self, Q: Array) -> Array:
+        """Derivative of the energy in the unknowns, (active,)."""
+        return self.slope(Q)[self.active]
+
+    def hessian(self, Q: Array, definite: bool = False) -> sparse.csc_array:
+        """Symmetric sparse Hessian in the unknowns; ``definite`` for the sum of semi-definite forms of the elements."""
+        return self.evaluate(Q, definite).matrix
+
+    def evaluate(self, Q: Array, definite: bool = False) -> Evaluation:
+        """All at once."""
+        total, force = self._work(Q), float(np.abs(self.loads).max(initial=0.0))
+        slope, sums = np.zeros(self.size), np.zeros(self.pattern.sums + 1)
+        for term, number, part, q in self._chunks(Q):
+            places = self.pattern.places[number]
+            if not places.pairs.size:
+                e, g = self._run(term, "EG", q, part)
+                packed = None
+            elif definite and self._forms[number] in ALONE:
+                e, g = self._run(term, "EG", q, part)
+                packed = self._output(len(term.kernel.DOFS), e.size)[2]
+                self._form(number, term, q, part, packed)
+            else:
+                e, g, packed = self._run(term, "EGH", q, part)
+                if definite:
+                    self._form(number, term, q, part, packed)
+            start = perf_counter()
+            total += float(np.add.reduce(e))
+            force = max(force, float(g.max(initial=0.0)), -float(g.min(initial=0.0)))
+            self._add(slope, term.table.rows[:, part], g, np.arange(len(g)))
+            if packed is not None:
+                self._add(sums, places.at[:, part], packed, places.pairs)
+            self.seconds["assembly"] += perf_counter() - start
+        start = perf_counter()
+        matrix = self.pattern.matrix(sums)
+        self.seconds["assembly"] += perf_counter() - start
+        return Evaluation(total, (slope - self.loads)[self.active], matrix, force)
+
+    def worst(self, Q: Array) -> Worst | None:
+        """The element that contributes most to the greatest entry of the gradient."""
+        slope = self.slope(Q)
+        if not self.active.size or not self.terms:
+            return None
+        entry = self.active[np.argmax(np.abs(slope[self.active]))]
+        found: tuple[float, Worst] | None = None
+        for term in self.terms:
+            at = np.flatnonzero((term.table.rows == entry).any(axis=0))
+            if not at.size:
+                continue
+            rows = term.table.rows[:, at]
+            e, g = self._run(term, "EG", Q[rows], at, fresh=True)
+            size = np.where(rows == entry, np.abs(g), 0).max(axis=0)
+            k = int(np.argmax(size))
+            if found is None or size[k] > found[0]:
+                found = float(size[k]), Worst(term.name, int(at[k]), float(e[k]), Q[rows[:, k]])
+        return None if found is None else found[1]
+
+    def softened(self, factor: float) -> System:
+        """The same system, with the stiffness of stretch multiplied by a factor."""
+        soft = copy(self)
+        soft.terms = tuple(
+            replace(t, parameters={**t.parameters, "k_s": factor * t.parameters["k_s"]}) if "k_s" in t.parameters else t
+            for t in self.terms
+        )
+        return soft
+
+    def softness(self, Q: Array) -> float:
+        """The factor at which stretch is about as stiff as all other forces together are strong."""
+        stiff = [float(np.max(t.parameters["k_s"])) for t in self.terms if "k_s" in t.parameters and t.table.count]
+        if not stiff:
+            return 1.0
+        others = copy(self)
+        others.terms = tuple(t for t in self.terms if "k_s" not in t.parameters)
+        held = others.slope(Q)[self.active]
+        return min(1.0, 3 * float(np.abs(held).sum()) / max(stiff))
+
+    # -- how
+
+    def _work(self, Q: Array) -> float:
+        if Q.shape != (self.size,):
+            raise ValueError(f"a configuration has shape ({self.size},), not {Q.shape}")
+        return -float(np.add.reduce(self.loads * Q))
+
+    def _chunks(self, Q: Array) -> Iterator[tuple[Term, int, slice, Array]]:
+        for number, term in enumerate(self.terms):
+            n = term.table.count
+            for start in range(0, n, CHUNK):
+                part = slice(start, min(start + CHUNK, n))
+                rows = term.table.rows[:, part]
+                q = self._output(rows.shape[0], rows.shape[1])[3]
+                before = perf_counter()
+                np.take(Q, rows, out=q, mode="clip")
+                self.seconds["assembly"] += perf_counter() - before
+                yield term, number, part, q
+
+    def _output(self, dof: int, n: int) -> list[Array]:
+        """Memory for energy, gradient, packed Hessian and rows of a chunk."""
+        if (dof, n) not in self._memory:
+            shapes = [(n,), (dof, n), (dof * (dof + 1) // 2, n), (dof, n)]
+            self._memory[dof, n] = [np.empty(shape) for shape in shapes]
+        return self._memory[dof, n]
+
+    def _run(self, term: Term, wanted: str, q: Array, part: Any, fresh: bool = False) -> list[Array]:
+        start = perf_counter()
+        out = None if fresh else [self._output(*q.shape)["EGH".index(key)] for key in wanted]
+        if out is not None and len(out) == 1:
+            out = out[0]
+        try:
+            found = Batch(term.kernel.KERNEL, wanted, q, term.some(part), out=out, engine=self.engine).results()
+        except ElementError as error:
+            at = error.elements + (part.start if isinstance(part, slice) else 0)
+            raise ElementError(f"{error} (of {term.name}, from element {at[0]} of the system)", at) from None
+        finally:
+            self.seconds["kernels"] += perf_counter() - start
+        return found
+
+    def _form(self, number: int, term: Term, q: Array, part: slice, packed: Array) -> None:
+        start = perf_counter()
+        self._forms[number](q, term.some(part), packed, self.pattern.places[number].pairs.tolist())
+        self.seconds["kernels"] += perf_counter() - start

@@ -1,0 +1,139 @@
+"""Kinetic energy of a system: momenta, forces of inertia, and their derivatives, all from the kinetic kernel."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from yarnverify.kernels.batch import Batch, upper
+from yarnverify.simulation.assembly import CHUNK, System, Term
+from yarnverify.simulation.pattern import Elements, zeros
+
+Array = NDArray[Any]
+
+
+class Kinetic(NamedTuple):
+    """Kinetic energy T(q, v): its value, momenta dT/dv and dT/dq (size,) each."""
+
+    energy: float
+    momentum: Array
+    slope: Array
+
+
+def elements_of(term: Term) -> Elements:
+    """The unknowns of a kinetic table without their rates, for the pattern of a system."""
+    half = _half(term)
+    return Elements(term.table.rows[:half], term.kernel.DOFS[:half])
+
+
+def _half(term: Term) -> int:
+    """Number of rows that are coordinates; their rates follow in the same order."""
+    half = len(term.kernel.DOFS) // 2
+    if not np.array_equal(term.table.rows[:half], term.table.rows[half:]):
+        raise ValueError(f"{term.name}: the second half of the rows must be rates of the first")
+    return half
+
+
+class Inertia:
+    """The kinetic energy of a system made with ``others=[elements_of(term)]``.
+
+    Parameters
+    ----------
+    system
+        Whose pattern and unknowns it shares.
+    term
+        Kinetic kernel and table: coordinates, then their rates.
+    moving
+        Whether sliding coordinates that are held are moved by the caller.
+    """
+
+    def __init__(self, system: System, term: Term, moving: bool = False) -> None:
+        self.system, self.term, self.half = system, term, _half(term)
+        self._places = system.pattern.places[len(system.terms)]
+        rows = term.table.rows[: self.half]
+        slides = [k for k, label in enumerate(term.kernel.DOFS[: self.half]) if "." not in label]
+        self.constant = not moving and not (system.pattern.local[rows[slides]] >= 0).any()
+
+    def _run(self, wanted: str, q: Array, part: slice) -> list[Array]:
+        term = self.term
+        return Batch(term.kernel.KERNEL, wanted, q, term.some(part), engine=self.system.engine).results()
+
+    def _parts(self, Q: Array, V: Array) -> Any:
+        rows = self.term.table.rows[: self.half]
+        for start in range(0, rows.shape[1], CHUNK):
+            part = slice(start, min(start + CHUNK, rows.shape[1]))
+            yield part, rows[:, part], np.concatenate([Q[rows[:, part]], V[rows[:, part]]])
+
+    def kinetic(self, Q: Array, V: Array) -> Kinetic:
+        """Energy, momenta and slope for coordinates and velocities (size,) each."""
+        energy, momentum, slope = 0.0, np.zeros(self.system.size), np.zeros(self.system.size)
+        every = np.arange(self.half)
+        for part, rows, q in self._parts(Q, V):
+            e, g = self._run("EG", q, part)
+            energy += float(np.add.reduce(e))
+            self.system._add(slope, rows, g[: self.half], every)
+            self.system._add(momentum, rows, g[self.half :], every)
+        return Kinetic(energy, momentum, slope)
+
+    def jacobian(self, Q: Array, V: Array, rate: float, weight: float, share: float) -> tuple[Any, Any]:
+        """``rate T_vv - share T_qq`` (symmetric) and ``weight (T_vq - T_qv)`` (skew), sparse, in the unknowns."""
+        half, pattern = self.half, self.system.pattern
+        number = {pair: k for k, pair in enumerate(upper(2 * half))}
+        pairs = [upper(half)[k] for k in self._places.pairs]
+        qq = np.array([number[i, j] for i, j in pairs], int)
+        vv = np.array([number[half + i, half + j] for i, j in pairs], int)
+        vq = np.array([number[j, half + i] for i, j in pairs], int)
+        qv = np.array([number[i, half + j] for i, j in pairs], int)
+        even, odd = np.zeros(pattern.sums + 1), np.zeros(pattern.sums + 1)
+        every = np.arange(len(pairs))
+        for part, rows, q in self._parts(Q, V):
+            (packed,) = self._run("H", q, part)
+            at = self._places.at[:, part]
+            self.system._add(even, at, rate * packed[vv] - share * packed[qq], every)
+            # a pair stands for the entry (i, j) of the element, which may lie below the diagonal of the system
+            local = pattern.local[rows]
+            turn = np.where(local[[i for i, _ in pairs]] > local[[j for _, j in pairs]], -weight, weight)
+            self.system._add(odd, at, turn * (packed[vq] - packed[qv]), every)
+        return pattern.matrix(even), pattern.skew(odd)
+
+    @cached_property
+    def mass(self) -> sparse.csr_array:
+        """The constant mass matrix of all entries of a configuration (size, size), where no sliding coordinate moves."""
+        half, size = self.half, self.system.size
+        number = {pair: k for k, pair in enumerate(upper(2 * half))}
+        axes = [k for k, label in enumerate(self.term.kernel.DOFS[:half]) if "." in label]
+        none = zeros(self.term.kernel.KERNEL)
+        pairs = [(i, j, number[half + min(i, j), half + max(i, j)]) for i in axes for j in axes]
+        pairs = [pair for pair in pairs if pair[2] not in none]
+        found = []
+        for part, rows, q in self._parts(self._rest, np.zeros(size)):
+            (packed,) = self._run("H", q, part)
+            found += [(packed[k], rows[i], rows[j]) for i, j, k in pairs]
+        data, row, column = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return sparse.coo_array((data, (row, column)), shape=(size, size)).tocsr()
+
+    def bind(self, Q: Array) -> None:
+        """Take the sliding coordinates of a configuration as those of the constant mass matrix."""
+        rows = self.term.table.rows[: self.half]
+        slides = [k for k, label in enumerate(self.term.kernel.DOFS[: self.half]) if "." not in label]
+        key = Q[rows[slides]].tobytes() if self.constant else b""
+        if key != getattr(self, "_key", None):
+            self._key, self._rest = key, Q.copy()
+            self.__dict__.pop("mass", None)
+            self.__dict__.pop("active_mass", None)
+
+    @cached_property
+    def active_mass(self) -> sparse.csc_array:
+        """The constant mass matrix of the unknowns, in the pattern of the system."""
+        number = {pair: k for k, pair in enumerate(upper(2 * self.half))}
+        pairs = [upper(self.half)[k] for k in self._places.pairs]
+        vv = np.array([number[self.half + i, self.half + j] for i, j in pairs], int)
+        sums = np.zeros(self.system.pattern.sums + 1)
+        for part, _, q in self._parts(self._rest, np.zeros(self.system.size)):
+            (packed,) = self._run("H", q, part)
+            self.system._add(sums, self._places.at[:, part], packed[vv], np.arange(len(pairs)))
+        return self.system.pattern.matrix(sums)

@@ -1,0 +1,170 @@
+"""Conjugate gradients with the yarn-line preconditioner: a banded Cholesky along each yarn, warp and weft added.
+
+Cloth is stiff along its yarns and soft across them, which makes a line the natural block. All yarns of a family lie one
+after the other in one banded matrix. Sums are NumPy's own, not those of BLAS, whose threads cost more than dot products do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+from yarnverify.simulation.linear.protocol import LinearSolveError
+from yarnverify.simulation.linear.threads import one_thread
+
+Array = NDArray[Any]
+
+
+def lines_of(fabric: Any, system: Any) -> list[Array]:
+    """The unknowns along the yarns of each family, one yarn after the other, in the order of ``system.active``."""
+    families: dict[str, list[Array]] = {}
+    for yarn in fabric.yarns:
+        entries = np.concatenate([fabric.position(yarn.nodes), np.asarray(yarn.slides)[:, None]], axis=1)
+        if yarn.closed:
+            entries = entries[:-2]
+        found = system.pattern.local[entries.reshape(-1)]
+        families.setdefault(yarn.family, []).append(found[found >= 0])
+    lines = [np.concatenate(parts).astype(np.int64) for parts in families.values()]
+    covered = np.zeros(system.count, bool)
+    for line in lines:
+        covered[line] = True
+    return [*lines, *([np.flatnonzero(~covered)] if not covered.all() else [])]
+
+
+class ConjugateGradients:
+    """An iterative solver for positive definite matrices of one pattern.
+
+    Parameters
+    ----------
+    lines
+        Unknowns of each family of yarns in order along them; each unknown is in one family at least.
+    tolerance
+        Residual at which to stop, relative to the right-hand side.
+    iterations
+        Greatest number of iterations.
+    """
+
+    def __init__(self, lines: Sequence[Array], tolerance: float = 1e-10, iterations: int = 5000) -> None:
+        self.lines, self.tolerance, self.iterations = list(lines), tolerance, iterations
+        self._bands: list[tuple[int, Array, Array]] | None = None
+        self._entries = 0
+
+    @one_thread()
+    def factorise(self, matrix: Any) -> Gradients:
+        """Factorise the line blocks of a symmetric sparse matrix.
+
+        Raises
+        ------
+        LinearSolveError
+            A block is not positive definite.
+        """
+        if self._bands is None or self._entries != matrix.nnz:
+            self._bands = [_band(matrix, line) for line in self.lines]
+            self._entries = matrix.nnz
+        factors = []
+        for line, (width, source, target) in zip(self.lines, self._bands, strict=True):
+            band = np.zeros((line.size, width + 1))
+            band.reshape(-1)[target] = matrix.data[source]
+            factor, info = lapack.dpbtrf(band.T, lower=1, overwrite_ab=1)
+            if info:
+                raise LinearSolveError("conjugate gradients: the block of a yarn is not positive definite")
+            factors.append((line, factor))
+        return Gradients(matrix, factors, self.tolerance, self.iterations)
+
+
+def _band(matrix: Any, line: Array) -> tuple[int, Array, Array]:
+    """Width of the band of a line, and where its entries come from and go to."""
+    place = np.full(matrix.shape[0], -1, np.int32)
+    place[line] = np.arange(line.size, dtype=np.int32)
+    column = place[np.repeat(np.arange(matrix.shape[0], dtype=np.int32), np.diff(matrix.indptr))]
+    row = place[matrix.indices]
+    # entries between different yarns that lie one after the other belong to the band as well, if they are near
+    near = np.flatnonzero((column >= 0) & (row >= column))
+    distance = (row[near] - column[near]).astype(np.int64)
+    width = _width(distance)
+    inside = distance <= width
+    near, distance = near[inside], distance[inside]
+    kind = np.int32 if max(matrix.nnz, line.size * (width + 1)) < 2**31 else np.int64
+    return width, near.astype(kind), (column[near] * (width + 1) + distance).astype(kind)
+
+
+def _width(distance: Array) -> int:
+    """The distance to which the entries of nearly every unknown of a line reach, without a gap."""
+    if not distance.size:
+        return 0
+    counts = np.bincount(distance)
+    often = counts > counts[0] // 50
+    return int(np.argmin(often) - 1) if not often.all() else len(counts) - 1
+
+
+class Gradients:
+    """A matrix with its preconditioner."""
+
+    negative: int | None = None
+
+    def __init__(self, matrix: Any, factors: list[tuple[Array, Array]], tolerance: float, iterations: int) -> None:
+        self._matrix, self._factors = matrix.T, factors  # of a symmetric matrix: rows are faster to multiply with
+        self._tolerance, self._iterations = tolerance, iterations
+        self.steps = 0  # of the last solution
+
+    @one_thread()
+    def solve(self, b: Array) -> Array:
+        """The solution for a right-hand side (n,).
+
+        Raises
+        ------
+        LinearSolveError
+            A direction of negative curvature, or too many iterations.
+        """
+        x = np.zeros_like(b)
+        goal = self._tolerance * _length(b)
+        for _ in range(3):  # the recursion's residual drifts; the true one decides
+            residual = b - self._matrix @ x if x.any() else b.copy()
+            if _length(residual) <= 2 * goal:
+                return x
+            self._iterate(x, residual, goal)
+        worst = _length(b - self._matrix @ x)
+        if worst > 100 * goal:
+            raise LinearSolveError(
+                f"conjugate gradients: residual {worst:.1e} after {self.steps} iterations, wanted {goal:.1e}"
+            )
+        return x
+
+    def _iterate(self, x: Array, residual: Array, goal: float) -> None:
+        direction = better = self._precondition(residual)
+        product = _sum(residual, better)
+        self.steps = 0
+        while _length(residual) > goal:
+            image = self._matrix @ direction
+            curvature = _sum(direction, image)
+            if not curvature > 0:
+                raise LinearSolveError("conjugate gradients: the matrix is not positive definite", direction)
+            step = product / curvature
+            x += step * direction
+            residual -= step * image
+            better = self._precondition(residual)
+            before, product = product, _sum(residual, better)
+            direction = better + (product / before) * direction
+            self.steps += 1
+            if self.steps > self._iterations:
+                raise LinearSolveError(
+                    f"conjugate gradients: residual {_length(residual):.1e} after {self.steps} iterations, wanted {goal:.1e}"
+                )
+
+    def _precondition(self, r: Array) -> Array:
+        total = np.zeros_like(r)
+        for line, factor in self._factors:
+            total[line] += lapack.dpbtrs(factor, r[line], lower=1, overwrite_b=1)[0]
+        return total
+
+
+def _sum(a: Array, b: Array) -> float:
+    return float(np.add.reduce(a * b))
+
+
+def _length(a: Array) -> float:
+    return float(np.sqrt(_sum(a, a)))

@@ -1,0 +1,74 @@
+"""What a linear solver is, and the check that every solution passes."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+TOLERANCE = 1e-9  # of a residual, relative to |A| |x| + |b|
+
+
+class LinearSolveError(ArithmeticError):
+    """A matrix that could not be factorised, or a solution that does not solve.
+
+    ``direction`` is a vector v with v.A v < 0, where a solver has come upon one.
+    """
+
+    def __init__(self, message: str, direction: Array | None = None) -> None:
+        super().__init__(message)
+        self.direction = direction
+
+
+class Factor(Protocol):
+    """A factorised matrix."""
+
+    @property
+    def negative(self) -> int | None:
+        """Number of negative eigenvalues; None if this is not known."""
+
+    def solve(self, b: Array) -> Array:
+        """The solution for a right-hand side (n,)."""
+
+
+class Solver(Protocol):
+    """Factorises matrices of one pattern."""
+
+    def factorise(self, matrix: Any) -> Factor:
+        """The factor of a sparse matrix (n, n)."""
+
+
+def checked(matrix: Any, b: Array, x: Array, again: Any, name: str, tolerance: float = TOLERANCE) -> Array:
+    """A solution whose residual is small, refined once where it is not.
+
+    Parameters
+    ----------
+    again
+        A function that solves for another right-hand side.
+
+    Raises
+    ------
+    LinearSolveError
+        Values that are not finite, or a residual that stays large.
+    """
+    for attempt in range(2):
+        if not np.isfinite(x).all():
+            raise LinearSolveError(f"{name}: the solution is not finite: the matrix is singular")
+        residual = b - matrix @ x
+        size = norm(matrix) * np.abs(x).max(initial=0.0) + np.abs(b).max(initial=0.0)
+        worst = float(np.abs(residual).max(initial=0.0))
+        if worst <= tolerance * size and worst <= 0.1 * np.abs(b).max(initial=0.0):
+            return x
+        if attempt == 0:
+            x = x + again(residual)
+    raise LinearSolveError(
+        f"{name}: the residual {worst:.1e} is too large against |A| |x| + |b| = {size:.1e}: the matrix is singular or nearly so"
+    )
+
+
+def norm(matrix: Any) -> float:
+    """Greatest entry of a sparse matrix in absolute value: a lower bound of its norm."""
+    data = matrix.data
+    return max(float(data.max(initial=0.0)), -float(data.min(initial=0.0)))

@@ -1,0 +1,230 @@
+"""Still pictures and movies as files, with scale and legend."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from yarnverify.errors import InputError
+from yarnverify.simulation.cloth import Fabric
+from yarnverify.simulation.view.camera import Camera, camera
+from yarnverify.simulation.view.drawing import Body, Pixels, body, pixels
+from yarnverify.simulation.view.measures import Measure, measure, shown
+from yarnverify.simulation.view.sheet import BOTTOM, RIGHT, TOP, Sheet
+
+Colour = str | Measure | None
+View = str | tuple[ArrayLike, ArrayLike]
+ROOM = (0.03, RIGHT, BOTTOM, TOP)
+
+
+def picture(
+    fabric: Fabric,
+    Q: ArrayLike,
+    path: str | Path,
+    *,
+    colour: Colour = None,
+    limits: tuple[float, float] | None = None,
+    view: View = "oblique",
+    title: str = "",
+    note: str = "",
+    size: tuple[int, int] = (1600, 1200),
+) -> Path:
+    """Draw a configuration as PNG (or any format that pillow knows).
+
+    Parameters
+    ----------
+    Q
+        Configuration, (size,), m.
+    colour
+        ``stretch``, ``bending``, ``shear``, ``contact``, or a ``Measure``; None shows warp and weft.
+    limits
+        Ends of the scale, in the unit of the measure; by default what the configuration has.
+    view
+        See ``camera.camera``.
+    title, note
+        Written above, at the left and at the right.
+    size
+        Width and height in pixels.
+    """
+    chosen = _chosen(fabric, Q, colour)
+    drawn = body(fabric, Q, chosen, limits, **_fineness(fabric))
+    seen = camera([drawn.tubes.points], view, aspect=size[0] / size[1], room=ROOM)
+    sheet = Sheet(fabric, size, seen, chosen, limits, title)
+    return _save(sheet.compose(pixels(drawn, seen, size), note), Path(path))
+
+
+def movie(
+    fabric: Fabric,
+    frames: Sequence[ArrayLike],
+    path: str | Path,
+    *,
+    times: Sequence[float] | None = None,
+    colour: str | Sequence[Measure] | None = None,
+    limits: tuple[float, float] | None = None,
+    view: View = "oblique",
+    turn: float = 0.0,
+    title: str = "",
+    size: tuple[int, int] = (960, 720),
+    rate: float = 20.0,
+) -> Path:
+    """A movie of configurations over time, or of a standing one from all around: GIF, or MP4 where imageio-ffmpeg is installed.
+
+    Camera and scale are the same in all frames.
+
+    Parameters
+    ----------
+    frames
+        Configurations, (size,) each.
+    times
+        Of each frame, s; written into the picture.
+    colour
+        As in ``picture``, or one measure a frame.
+    turn
+        Turns of the camera about the vertical from the first frame to the end.
+    rate
+        Frames a second.
+
+    Raises
+    ------
+    InputError
+        No frames, or a file name that does not end in .gif or .mp4.
+    """
+    path = Path(path)
+    if path.suffix not in (".gif", ".mp4"):
+        raise InputError(f"{path.name}: a movie ends in .gif or .mp4")
+    if not len(frames) or (times is not None and len(times) != len(frames)):
+        raise InputError(f"a movie needs frames, and a time for each: {len(frames)} frames")
+    given: Sequence[Colour] = [colour] * len(frames) if colour is None or isinstance(colour, str) else list(colour)
+    measures = [_chosen(fabric, Q, one) for Q, one in zip(frames, given, strict=True)]
+    scale, measures = _common(measures, limits)
+    fineness = _fineness(fabric, moving=True)
+
+    def bodies() -> Iterator[Body]:
+        for Q, one in zip(frames, measures, strict=True):
+            yield body(fabric, Q, one, scale, **fineness)
+
+    clouds = (drawn.strands.points for drawn in bodies())
+    seen = camera(clouds, view, aspect=size[0] / size[1], room=ROOM, margin=fabric.R, turning=turn != 0)
+    sheet = Sheet(fabric, size, seen, measures[0], scale, title)
+    notes = [""] * len(frames) if times is None else [_time(t, max(map(abs, times))) for t in times]
+    images = (
+        sheet.compose(pixels(drawn, _turned(seen, turn * k / len(frames)), size), note)
+        for k, (drawn, note) in enumerate(zip(bodies(), notes, strict=True))
+    )
+    return _write_movie(images, path, rate)
+
+
+def turntable(
+    fabric: Fabric, Q: ArrayLike, path: str | Path, *, colour: Colour = None, frames: int = 48, view: View = "oblique",
+    title: str = "", size: tuple[int, int] = (960, 720), rate: float = 16.0,
+) -> Path:  # fmt: skip
+    """A movie once around a configuration."""
+    given = [colour] * frames if isinstance(colour, Measure) else colour
+    return movie(fabric, [Q] * frames, path, colour=given, view=view, turn=1.0, title=title, size=size, rate=rate)
+
+
+def _turned(seen: Camera, turns: float) -> Camera:
+    return seen.turned(2 * np.pi * turns) if turns else seen
+
+
+def _chosen(fabric: Fabric, Q: ArrayLike, colour: Colour) -> Measure | None:
+    return measure(fabric, Q, colour) if isinstance(colour, str) else shown(colour) if colour is not None else None
+
+
+def _common(
+    measures: list[Measure | None], limits: tuple[float, float] | None
+) -> tuple[tuple[float, float] | None, list[Measure | None]]:
+    """One scale, and one unit, for all frames."""
+    known = [m for m in measures if m is not None]
+    if not known:
+        return None, measures
+    if limits is None:
+        limits = (min(m.limits[0] for m in known), max(m.limits[1] for m in known))
+    return limits, measures
+
+
+def _fineness(fabric: Fabric, moving: bool = False) -> dict[str, int]:
+    """Samples a segment and faces around: fewer where there are so many yarns that nobody could see them."""
+    count = len(fabric.chain.nodes)
+    for most, detail, sides in ((2000, 12, 24), (10_000, 8, 16), (60_000, 6, 10)):
+        if count <= most:
+            return {"detail": detail - 2 * moving, "sides": sides - 4 * moving}
+    return {"detail": 4, "sides": 6}
+
+
+def _time(t: float, most: float) -> str:
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if most >= size:
+            return f"t = {t / size:.{2 if unit == 's' else 1}f} {unit}"
+    return f"t = {t:.3g} s"
+
+
+# -- files ------------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _whole(path: Path) -> Iterator[Path]:
+    """A name to write to beside the wanted one, moved there once all is written."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.stem}.part{path.suffix}")
+    try:
+        yield part
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _save(image: Pixels, path: Path) -> Path:
+    from PIL import Image
+
+    with _whole(path) as part:
+        Image.fromarray(image).save(part)
+    return path
+
+
+def _write_movie(images: Iterator[NDArray[np.uint8]], path: Path, rate: float) -> Path:
+    with _whole(path) as part:
+        if path.suffix == ".mp4":
+            _write_mp4(images, part, rate)
+        else:
+            _write_gif(images, part, rate)
+    return path
+
+
+def _write_gif(images: Iterator[Pixels], path: Path, rate: float) -> None:
+    from PIL import Image
+
+    frames = [Image.fromarray(image) for image in images]
+    # one palette for all frames, from several of them: colours keep their meaning and nothing flickers
+    few = frames[:: max(1, len(frames) // 6)]
+    strip = Image.new("RGB", (few[0].width, few[0].height * len(few)))
+    for k, frame in enumerate(few):
+        strip.paste(frame, (0, k * frame.height))
+    palette = strip.quantize(256, Image.Quantize.MEDIANCUT)
+    flat = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    flat[0].save(path, save_all=True, append_images=flat[1:], duration=round(1000 / rate), loop=0, optimize=False)
+
+
+def _write_mp4(images: Iterator[Pixels], path: Path, rate: float) -> None:
+    try:
+        import imageio_ffmpeg
+    except ImportError:
+        raise InputError(
+            f"{path.name}: an .mp4 needs imageio-ffmpeg (pip install imageio-ffmpeg); a .gif needs nothing"
+        ) from None
+    writer = None
+    for image in images:
+        even = np.ascontiguousarray(image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2])
+        if writer is None:
+            writer = imageio_ffmpeg.write_frames(
+                str(path), (even.shape[1], even.shape[0]), fps=rate, codec="libx264", quality=8, macro_block_size=2
+            )
+            writer.send(None)
+        writer.send(even)
+    if writer is not None:
+        writer.close()

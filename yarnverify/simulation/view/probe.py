@@ -1,0 +1,41 @@
+"""Whether VTK can render here, found out in a child process: without OpenGL VTK ends the process instead of raising."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+from functools import cache
+
+PACKAGES = "libegl1 libgl1-mesa-dri"  # Debian: EGL without a display, and Mesa's renderer for processors
+_TRIAL = """
+import pyvista
+plotter = pyvista.Plotter(off_screen=True, window_size=(64, 64))
+plotter.set_background("white")
+plotter.add_mesh(pyvista.Sphere(), color="red")
+image = plotter.screenshot(return_img=True)
+assert (image[32, 32] != image[0, 0]).any()
+print("rendered")
+"""
+
+
+def without_display() -> None:
+    """Make VTK render without a display where there is none. Has to come before the first import of VTK."""
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+
+@cache
+def why_not() -> str | None:
+    """None where pyvista renders; else one line that says why not and what would help. Looked up once a process."""
+    if importlib.util.find_spec("pyvista") is None:
+        return "pyvista is not installed (pip install 'yarnverify[view]'): matplotlib draws instead"
+    without_display()
+    try:
+        trial = subprocess.run([sys.executable, "-c", _TRIAL], capture_output=True, text=True, timeout=120)
+    except (OSError, subprocess.TimeoutExpired):
+        trial = None
+    if trial is not None and trial.returncode == 0 and trial.stdout.strip().endswith("rendered"):
+        return None
+    return f"VTK cannot render here (on Debian: apt install {PACKAGES}): matplotlib draws instead"
