@@ -79,7 +79,6 @@ def test_elastica_shape_agrees_with_the_differential_equation(alpha: float) -> N
     assert place == pytest.approx((found[2:, :1] - found[2:]).T, abs=near)
     assert place[0] == pytest.approx([0, 0], abs=1e-15) and abs(theta[0]) < 1e-12
     assert [*place[-1], theta[-1]] == pytest.approx([tip.along, tip.deflection, tip.angle], rel=1e-13)
-    )
 
 
 def test_elastica_shape_takes_any_shape_of_arc_lengths() -> None:
@@ -114,7 +113,7 @@ def test_a_heavy_cantilever_started_from_its_tip_reaches_the_wall_level(beta: fl
     assert wall[0] == pytest.approx(math.pi / 2, abs=1e-12 * (1 + beta))
     assert [found.tip.along, found.tip.deflection] == pytest.approx(wall[2:], abs=1e-11)
     theta, place = found.at([0, 1])
-    assert theta == pytest.approx([0, found.tip.angle], abs=1e-14) and place[1, 1] == pytest.approx(found.tip.deflection, rel=1e-15)
+    assert [*theta, *place[1]] == pytest.approx([0, found.tip.angle, found.tip.along, found.tip.deflection], abs=1e-14)
 
 
 def test_a_cantilever_without_weight_is_the_elastica_and_a_light_one_is_linear() -> None:
