@@ -154,7 +154,7 @@ def test_a_hanging_chain_is_in_balance() -> None:
     chain = answers.hanging_chain(rest, tip_force=2e-3, **YARN)
     forces = unbalanced(chain.points, rest, **YARN)
     assert forces[:, 1:-1] == pytest.approx(0, abs=1e-15 * 250) and forces[2, -1] == pytest.approx(2e-3, rel=1e-9)
-    assert -forces[2, 0] == pytest.approx(-(YARN["rho"] * 9.81 * 0.7 + 2e-3), rel=1e-9)
+    assert -forces[2, 0] == pytest.approx(YARN["rho"] * 9.81 * 0.7 + 2e-3, rel=1e-9)
     assert chain.tension[0] == pytest.approx(YARN["rho"] * 9.81 * 0.55 + 2e-3)
 
 
