@@ -55,7 +55,9 @@ def test_an_energy_under_two_names_is_declared_once(tmp_path: Path) -> None:
 
 
 def test_the_declarations_of_the_main_document(declarations: Declarations) -> None:
-    assert [e.name for e in declarations.energies] == ["bending", "parallel_contact", "shear", "stretch"]
+    printed = [e.name for e in declarations.energies if e.document]
+    assert printed == ["bending", "parallel_contact", "shear", "stretch"]
+    assert [e.name for e in declarations.energies if not e.document] == ["gravity", "kinetic", "plane", "sphere"]
     assert sorted(str(q.symbol) for q in declarations.quantities) == ["P_i", "d_i", "l_i", "phi", "theta", "w_i"]
 
 
@@ -67,6 +69,10 @@ def test_a_folder_without_python_files_declares_nothing(tmp_path: Path) -> None:
 BAD = {
     "unknown without annotation": ("@energy()\ndef e(x1):\n    return x1\n", 2, "'x1' of e must be annotated Point"),
     "parameter without annotation": ("@energy()\ndef e(u1: Sliding, *, k):\n    return k\n", 2, "'k' of e must be annotated"),
+    "vector without unit": ("@energy()\ndef e(u1: Sliding, *, g: Vector):\n    return g\n", 2, "'g' of e must be annotated"),
+    "no such rate": (
+        "@energy()\ndef e(u1: Sliding):\n    return u1\n@unchanged_by(e)\ndef m():\n    return {'u7': 1}\n", 5, "no unknown u7",
+    ),
     "unit left out": ("@energy()\ndef e(u1: Sliding, *, k: Positive):\n    return k\n", 2, "'k' of e must be annotated"),
     "syntax error": ("def e(:\n", 2, "invalid syntax"),
     "wrong indentation": ("def e():\nreturn 1\n", 3, "expected an indented block"),

@@ -10,8 +10,7 @@
     bending.packed(q, k_b=...)              the same with the upper triangle only, for assembly
 
 The default variant is ``accurate``; the packages ``yarnverify.kernels.fast`` and so on hold the others, all with the same
-interface; energies that the document does not print (gravity, kinetic energy, obstacles) have ``accurate``, ``fast`` and
-``reference``.
+interface; what the document does not print (gravity, kinetic energy, obstacles) comes as ``accurate``, ``fast``, ``reference``.
 Generated modules hold straight-line formulas over ``geometry`` (safe atoms); ``batch`` runs them by way of ``tape``
 (chunks of NumPy calls), ``doubledouble`` or ``compiled`` (numba).
 """

@@ -130,8 +130,10 @@ class Increment:
             length = float(np.abs(step).max(initial=0.0))
             history.append(Iteration(0.0, worst, length, "full"))
             noise = 4 * EPSILON * (abs(matrix) @ np.abs(Q[self.active]))
-            if length <= 1e-14 * np.ptp(Q) or worst <= 1e-13 * size or (
-                length < 1e-9 * np.ptp(Q) and (np.abs(found) <= noise).all()
+            if (
+                length <= 1e-14 * np.ptp(Q)
+                or worst <= 1e-13 * size
+                or (length < 1e-9 * np.ptp(Q) and (np.abs(found) <= noise).all())
             ):
                 return self._moved(Q, step)
             if length < last:

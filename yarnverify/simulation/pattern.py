@@ -103,9 +103,9 @@ class Pattern:
     def _spread(self, number: Array) -> None:
         """From blocks to unknowns, full matrix and upper triangle."""
         total = int(self._widths.sum())
-        inside = np.arange(total, dtype=np.int32) - np.repeat(np.cumsum(self._widths) - self._widths, self._widths).astype(
-            np.int32
-        )
+        inside = np.arange(total, dtype=np.int32) - np.repeat(
+            np.cumsum(self._widths) - self._widths, self._widths
+        ).astype(np.int32)
         columns = np.repeat(self._first[self.graph.indices], self._widths) + inside
         length = np.diff(self._row_pointer)[number]
         pointer = np.concatenate([[0], np.cumsum(length)])

@@ -281,7 +281,9 @@ class Search:
         shift = 0.0
         for _ in range(12):
             try:
-                factor = self._factorise(matrix + shift * sparse.eye_array(matrix.shape[0], format="csc") if shift else matrix)
+                factor = self._factorise(
+                    matrix + shift * sparse.eye_array(matrix.shape[0], format="csc") if shift else matrix
+                )
                 if not factor.negative:
                     return None, self._short(self._solve(factor, -value.gradient))
             except LinearSolveError:

@@ -41,7 +41,7 @@ def downhill(matrix: Any, factor: Factor, step: Array) -> Array:
 
 
 def negative_direction(matrix: Any, factor: Factor | None) -> Array | None:
-    """A direction v, greatest entry 1, in which a symmetric matrix is negative, v.A v < 0 beyond rounding; None if not found."""
+    """A direction v, greatest entry 1, in which a symmetric matrix is negative (v.A v < 0 beyond rounding), or None."""
     if factor is None:
         return None
     try:

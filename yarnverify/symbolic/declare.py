@@ -155,7 +155,7 @@ class Energy:
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion that leaves an energy as it is: the rate of each unknown that moves, which may depend on the state."""
+    """A special motion that leaves an energy as it is: the rate of each unknown that moves; it may depend on the state."""
 
     energy: str
     name: str

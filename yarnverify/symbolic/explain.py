@@ -10,10 +10,12 @@ from yarnverify.library import derivations
 from yarnverify.symbolic.court import Court, Verdict
 from yarnverify.symbolic.declare import Declarations, Energy, load_declarations
 from yarnverify.symbolic.derive import Derivation, declared_section, derive_declared
+from yarnverify.symbolic.invariants import prove_invariants
 from yarnverify.symbolic.latex import latex, name_latex
 from yarnverify.symbolic.measures import Measure, Segment
 from yarnverify.symbolic.plain import name_plain, plain
 from yarnverify.symbolic.scalars import scalar_tree, sum_tree
+from yarnverify.symbolic.sums import Stages, is_rational
 from yarnverify.symbolic.tree import FORCE, Expr, Name
 
 Step = dict[str, Any]
@@ -31,7 +33,9 @@ def explanation(name: str, folder: Path | None = None) -> dict[str, Any]:
     declarations = load_declarations(place)
     for energy in declarations.energies:
         if energy.name == name:
-            return explain_energy(energy, declarations)
+            found = explain_energy(energy, declarations)
+            found["steps"].append(_invariances(energy, declarations))
+            return found
     known = ", ".join(energy.name for energy in declarations.energies) or "none"
     raise InputError(f"no energy {name!r} is declared in {place}; there are: {known}")
 
@@ -39,9 +43,10 @@ def explanation(name: str, folder: Path | None = None) -> dict[str, Any]:
 def explain_energy(energy: Energy, declarations: Declarations) -> dict[str, Any]:
     derivation = derive_declared(energy, declarations.quantities)
     steps = [_declared(energy)]
+    proved: dict[str, str]
     if derivation is None:
         steps += _plain_steps(energy)
-        proved: dict[str, str] = {}
+        proved = _plain_proofs(energy)
     else:
         steps += [_measure(measure) for measure in derivation.measures]
         steps += [_law(derivation), _chain_rule(derivation), *_result(derivation)]
@@ -157,12 +162,31 @@ def _plain_steps(energy: Energy) -> list[Step]:
     return [_step("Plain differentiation", note, values)]
 
 
+def _plain_proofs(energy: Energy) -> dict[str, str]:
+    """What the kernels of a rational energy hold, against its derivatives; of any other energy nothing is proved."""
+    section = declared_section(energy)
+    if not is_rational(energy, section):
+        return {}
+    wrong = Stages(energy, section).prove()
+    return {"gradient and Hessian": str(Verdict.REFUTED if wrong else Verdict.PROVED)}
+
+
+def _invariances(energy: Energy, declarations: Declarations) -> Step:
+    found = prove_invariants(energy, declarations.motions)
+    verdicts = "; ".join(
+        f"{what.removeprefix('invariance under ')}: {finding.verdict}" for what, finding in found.items()
+    )
+    return _step("Unchanged by", f"{verdicts or 'nothing declared'}.", [])
+
+
 def explain(record: dict[str, Any], form: str) -> str:
     """A derivation as text, LaTeX or Markdown."""
     lines: list[str] = []
     count = len(record["proof"])
+    blocks = f"the law and {count - 1} blocks, each by normal form and by rational evaluation"
+    plain_blocks = "gradient and Hessian, entry by entry, as rational functions"
     verdict = (
-        f"Proved exactly: the law and {count - 1} blocks, each by normal form and by rational evaluation."
+        f"Proved exactly: {blocks if record['measures'] else plain_blocks}."
         if record["all_proved"]
         else "Proof: "
         + (

@@ -17,6 +17,7 @@ from yarnverify.symbolic.angles import prove_derivatives, prove_recurrence, turn
 from yarnverify.symbolic.court import Court, Finding, Verdict
 from yarnverify.symbolic.declare import Declarations, Energy, load_declarations
 from yarnverify.symbolic.derive import Derivation, declared_section, derive_declared
+from yarnverify.symbolic.dimensions import DimensionError, check_dimensions
 from yarnverify.symbolic.document import Claim, Document, Section, block_of
 from yarnverify.symbolic.emit import (
     LIBRARY,
@@ -48,7 +49,9 @@ SUMMARY = {
     "printed": "the document's own formulas, misprints included",
 }
 VARIANTS = tuple(SUMMARY)
-_PLAIN_SUMS = "no measures here: plain sums, formed once, which lose only what the rounding of their terms explains"
+_PLAIN_SUMS = (
+    "no measures: each sum is formed once, in plain arithmetic, and loses only what the rounding of its terms explains"
+)
 _SERIES_TOP, _SERIES_DEGREE = Fraction(97, 500), 13  # sin(t/4)^2 is 0.1939 where cos t = -1/4
 
 
@@ -60,7 +63,8 @@ def kernel_modules(
     Raises
     ------
     NotRunError
-        If a derived block is not proved, or the document lacks a formula that its variant needs.
+        If a derived block or a declared invariance is not proved, units do not come out as that of the energy, or the
+        document lacks a formula that its variant needs.
     """
     declarations = load_declarations(folder)
     energies = [energy for energy in declarations.energies if energy.document in (document, "")]
@@ -69,6 +73,10 @@ def kernel_modules(
     texts: dict[str, str] = {"series.py": series_module()}
     record: dict[str, Any] = {}
     for energy in energies:
+        try:
+            check_dimensions(energy)
+        except DimensionError as error:
+            raise NotRunError(f"{energy.name}: {error}") from None
         derived = proved(energy, declarations)
         for variant in variants_of(energy):
             advance(f"{energy.name}, {variant}", len(planned))
@@ -127,9 +135,9 @@ def proved(energy: Energy, declarations: Declarations) -> Proved:
     Raises
     ------
     NotRunError
-        If a derived block is not proved.
+        If a derived block or a declared invariance is not proved.
     """
-    _require_proofs(energy.name, prove_invariants(energy, declarations.motions))
+    _require_proofs(energy.name, prove_invariants(energy, declarations.motions), "")
     derivation = derive_declared(energy, declarations.quantities)
     if derivation is None:
         section = declared_section(energy)
@@ -150,12 +158,11 @@ def proved(energy: Energy, declarations: Declarations) -> Proved:
 
 def derived_programs(energy: Energy, found: Proved, variant: str) -> tuple[list[Program], list[str]]:
     """The programs of a derived variant, and notes on what is not as wished."""
-    if found.stages is not None:
+    if found.stages is not None and variant != "differentiated":
         return [found.stages.program()], [_PLAIN_SUMS] if variant == "accurate" else []
     if found.derivation is None:
-        return [plain_program(energy, declared_section(energy))], [
-            "this energy is no law of known measures: plain differentiation, nothing is done for its singular states"
-        ]
+        note = "this energy is no law of known measures: plain differentiation, nothing is done for its singular states"
+        return [plain_program(energy, declared_section(energy))], [note]
     if variant == "differentiated":
         return [derived_program(energy, found.derivation)], []
     if not found.shapes:
@@ -175,10 +182,10 @@ def derived_programs(energy: Energy, found: Proved, variant: str) -> tuple[list[
     return [safe_program(energy, shape, "twice" if compares else "exact", shapes) for shape in shapes], []
 
 
-def _require_proofs(what: str, found: dict[str, Finding]) -> None:
+def _require_proofs(what: str, found: dict[str, Finding], kind: str = "derived block ") -> None:
     for block, finding in found.items():
         if finding.verdict is not Verdict.PROVED:
-            raise NotRunError(f"{what}: {block} is {finding.verdict}: {finding.reason}")
+            raise NotRunError(f"{what}: {kind}{block} is {finding.verdict}: {finding.reason}")
 
 
 def derived_program(energy: Energy, derivation: Derivation) -> Program:

@@ -42,7 +42,9 @@ class _Front:
     own: _Block
     below: _Block
     parent: int
-    runs: list[tuple[int, int, int]]  # touched unknowns start to stop, and their place among the parent's own and touched
+    runs: list[
+        tuple[int, int, int]
+    ]  # touched unknowns start to stop, and their place among the parent's own and touched
 
 
 class Multifrontal:
@@ -236,7 +238,9 @@ class MultifrontalFactor:
             mine = x[front.first : front.last]
             if front.touched.size:
                 mine -= below.T @ x[front.touched]
-            mine[:] = blas.dtrsv(factor, mine, lower=1, trans=1) if pivots is None else lapack.dgetrs(factor, pivots, mine)[0]
+            mine[:] = (
+                blas.dtrsv(factor, mine, lower=1, trans=1) if pivots is None else lapack.dgetrs(factor, pivots, mine)[0]
+            )
         found = np.empty_like(x)
         found[self._order] = x
         return found
