@@ -17,7 +17,7 @@ from yarnverify.simulation.view.strands import Strands, strands
 from yarnverify.simulation.view.tubes import Tubes, tubes
 
 Pixels = NDArray[np.uint8]
-FAMILIES = {"warp": (38, 70, 109), "weft": (222, 196, 150), "yarn": (178, 76, 56)}  # indigo, ecru, madder
+FAMILIES = {"warp": (46, 84, 130), "weft": (222, 196, 150), "yarn": (178, 76, 56)}  # indigo, ecru, madder
 UNKNOWN = (190, 190, 190)  # where a measure has no value
 
 
@@ -89,7 +89,7 @@ def pixels(body: Body, seen: Camera, size: tuple[int, int]) -> Pixels:
 def _by_vtk(body: Body, seen: Camera, size: tuple[int, int]) -> Pixels:
     plotter = plotter_of(body, seen, size)
     try:
-        return np.asarray(plotter.screenshot(return_img=True), np.uint8)[..., :3]
+        return np.asarray(plotter.screenshot(None, return_img=True), np.uint8)[..., :3]
     finally:
         plotter.close()
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +12,7 @@ from yarnverify.errors import InputError
 from yarnverify.simulation.cloth import Fabric
 from yarnverify.simulation.view.camera import Camera, camera
 from yarnverify.simulation.view.drawing import Body, Pixels, body, pixels
+from yarnverify.simulation.view.files import whole
 from yarnverify.simulation.view.measures import Measure, measure, shown
 from yarnverify.simulation.view.sheet import BOTTOM, RIGHT, TOP, Sheet
 
@@ -111,7 +110,7 @@ def movie(
     clouds = (drawn.strands.points for drawn in bodies())
     seen = camera(clouds, view, aspect=size[0] / size[1], room=ROOM, margin=fabric.R, turning=turn != 0)
     sheet = Sheet(fabric, size, seen, measures[0], scale, title)
-    notes = [""] * len(frames) if times is None else [_time(t, max(map(abs, times))) for t in times]
+    notes = [""] * len(frames) if times is None else [time_note(t, max(map(abs, times))) for t in times]
     images = (
         sheet.compose(pixels(drawn, _turned(seen, turn * k / len(frames)), size), note)
         for k, (drawn, note) in enumerate(zip(bodies(), notes, strict=True))
@@ -157,7 +156,8 @@ def _fineness(fabric: Fabric, moving: bool = False) -> dict[str, int]:
     return {"detail": 4, "sides": 6}
 
 
-def _time(t: float, most: float) -> str:
+def time_note(t: float, most: float) -> str:
+    """A time in seconds with the unit that suits the latest one."""
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
         if most >= size:
             return f"t = {t / size:.{2 if unit == 's' else 1}f} {unit}"
@@ -167,28 +167,16 @@ def _time(t: float, most: float) -> str:
 # -- files ------------------------------------------------------------------------------------------------------------
 
 
-@contextmanager
-def _whole(path: Path) -> Iterator[Path]:
-    """A name to write to beside the wanted one, moved there once all is written."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.stem}.part{path.suffix}")
-    try:
-        yield part
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
 def _save(image: Pixels, path: Path) -> Path:
     from PIL import Image
 
-    with _whole(path) as part:
+    with whole(path) as part:
         Image.fromarray(image).save(part)
     return path
 
 
 def _write_movie(images: Iterator[NDArray[np.uint8]], path: Path, rate: float) -> Path:
-    with _whole(path) as part:
+    with whole(path) as part:
         if path.suffix == ".mp4":
             _write_mp4(images, part, rate)
         else:

@@ -1,4 +1,4 @@
-"""Whether VTK can render here, found out in a child process: where OpenGL is missing VTK ends the process instead of raising."""
+"""Whether VTK can render here, found out in a child process: without OpenGL it ends the process instead of raising."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import importlib.util
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from functools import cache
 
 PACKAGES = "libegl1 libgl1-mesa-dri"  # Debian: EGL without a display, and Mesa's renderer for processors
+_WINDOW, _EGL = "VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow"
 _TRIAL = """
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(64, 64))
@@ -23,7 +25,7 @@ print("rendered")
 def without_display() -> None:
     """Make VTK render without a display where there is none. Has to come before the first import of VTK."""
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+        os.environ.setdefault(_WINDOW, _EGL)
 
 
 @cache
@@ -32,10 +34,19 @@ def why_not() -> str | None:
     if importlib.util.find_spec("pyvista") is None:
         return "pyvista is not installed (pip install 'yarnverify[view]'): matplotlib draws instead"
     without_display()
-    try:
-        trial = subprocess.run([sys.executable, "-c", _TRIAL], capture_output=True, text=True, timeout=120)
-    except (OSError, subprocess.TimeoutExpired):
-        trial = None
-    if trial is not None and trial.returncode == 0 and trial.stdout.strip().endswith("rendered"):
+    if _renders(os.environ):
+        return None
+    if sys.platform.startswith("linux") and os.environ.get(_WINDOW) != _EGL and _renders({**os.environ, _WINDOW: _EGL}):
+        os.environ[_WINDOW] = _EGL  # there is a display, but not one that draws
         return None
     return f"VTK cannot render here (on Debian: apt install {PACKAGES}): matplotlib draws instead"
+
+
+def _renders(environment: Mapping[str, str]) -> bool:
+    try:
+        trial = subprocess.run(
+            [sys.executable, "-c", _TRIAL], capture_output=True, text=True, timeout=120, env=dict(environment)
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return trial.returncode == 0 and trial.stdout.strip().endswith("rendered")

@@ -10,6 +10,7 @@ k <= (1 - |cos(phi)|) / (2 R). The swing is a cosine as long as that holds, and 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -72,7 +73,7 @@ def strands(fabric: Fabric, Q: ArrayLike, detail: int = 8, crimp: bool = True) -
     starts = np.flatnonzero(np.r_[True, owner[1:] != owner[:-1], True])
     tau = np.arange(detail) / detail
     curves, places, parts, owners = [], [], [], []
-    for begin, end in zip(starts[:-1], starts[1:], strict=True):
+    for begin, end in pairwise(starts):
         along = np.r_[first[begin:end], second[end - 1]]
         nodes = points[chain.nodes[along]]
         chord = np.linalg.norm(np.diff(nodes, axis=0), axis=1)
