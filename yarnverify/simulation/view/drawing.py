@@ -68,6 +68,11 @@ def colours_of(values: NDArray[np.float64], limits: tuple[float, float], signed:
     return np.where(np.isfinite(values)[:, None], found, np.array(UNKNOWN, np.uint8))
 
 
+def families_of(fabric: Fabric) -> list[str]:
+    """Families that a legend has to tell apart."""
+    return [name for name in ("warp", "weft") if any(y.family == name for y in fabric.yarns)]
+
+
 @cache
 def table_of(signed: bool) -> Pixels:
     """The 256 colours of a scale, (256, 3): both keep their order in grey and for the colour-blind."""

@@ -127,13 +127,18 @@ def _families(fabric: Fabric, yarn: NDArray[np.int64]) -> NDArray[np.generic]:
 
 
 def _vtp(
-    points: NDArray[np.float64], kind: str, corners: NDArray[np.int64], sizes: NDArray[np.int64], at_points: Arrays, at_cells: Arrays
-) -> str:  # fmt: skip
+    points: NDArray[np.float64],
+    kind: str,
+    corners: NDArray[np.int64],
+    sizes: NDArray[np.int64],
+    at_points: Arrays,
+    at_cells: Arrays,
+) -> str:
     """VTK's XML for polygons or lines."""
     count = dict.fromkeys(("Verts", "Lines", "Strips", "Polys"), 0) | {kind: len(sizes)}
     numbers = " ".join(f'NumberOf{name}="{number}"' for name, number in count.items())
     body = [
-        f"<PointData{' Normals="Normals"' if 'Normals' in at_points else ''}>",
+        '<PointData Normals="Normals">' if "Normals" in at_points else "<PointData>",
         *(_array(name, values) for name, values in at_points.items()),
         "</PointData>",
         "<CellData>",

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from yarnverify.simulation.cloth import Fabric
 from yarnverify.simulation.view.camera import Camera
-from yarnverify.simulation.view.drawing import FAMILIES, table_of
+from yarnverify.simulation.view.drawing import FAMILIES, families_of, table_of
 from yarnverify.simulation.view.measures import Measure
 
 INK = "#222222"
@@ -102,8 +102,7 @@ class Sheet:
     def _families(self, fabric: Fabric) -> None:
         from matplotlib.patches import Rectangle
 
-        present = [name for name in FAMILIES if name != "yarn" and any(y.family == name for y in fabric.yarns)]
-        for row, name in enumerate(present):
+        for row, name in enumerate(families_of(fabric)):
             y = 0.54 - 0.05 * row
             colour = tuple(c / 255 for c in FAMILIES[name])
             self.figure.add_artist(
