@@ -6,14 +6,15 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from yarnverify.errors import InputError
 from yarnverify.simulation.cloth import Fabric
 from yarnverify.simulation.view.camera import Camera, camera
-from yarnverify.simulation.view.drawing import Body, Pixels, body, pixels
+from yarnverify.simulation.view.drawing import FAMILIES, Body, Pixels, body, pixels, table_of
 from yarnverify.simulation.view.files import whole
 from yarnverify.simulation.view.measures import Measure, measure, shown
+from yarnverify.simulation.view.movies import write_movie
 from yarnverify.simulation.view.sheet import BOTTOM, RIGHT, TOP, Sheet
 
 Colour = str | Measure | None
@@ -115,7 +116,8 @@ def movie(
         sheet.compose(pixels(drawn, _turned(seen, turn * k / len(frames)), size), note)
         for k, (drawn, note) in enumerate(zip(bodies(), notes, strict=True))
     )
-    return _write_movie(images, path, rate)
+    keep = np.array(list(FAMILIES.values()), np.uint8) if measures[0] is None else table_of(measures[0].signed)[::4]
+    return write_movie(images, path, rate, keep)
 
 
 def turntable(
@@ -164,55 +166,9 @@ def time_note(t: float, most: float) -> str:
     return f"t = {t:.3g} s"
 
 
-# -- files ------------------------------------------------------------------------------------------------------------
-
-
 def _save(image: Pixels, path: Path) -> Path:
     from PIL import Image
 
     with whole(path) as part:
         Image.fromarray(image).save(part)
     return path
-
-
-def _write_movie(images: Iterator[NDArray[np.uint8]], path: Path, rate: float) -> Path:
-    with whole(path) as part:
-        if path.suffix == ".mp4":
-            _write_mp4(images, part, rate)
-        else:
-            _write_gif(images, part, rate)
-    return path
-
-
-def _write_gif(images: Iterator[Pixels], path: Path, rate: float) -> None:
-    from PIL import Image
-
-    frames = [Image.fromarray(image) for image in images]
-    # one palette for all frames, from several of them: colours keep their meaning and nothing flickers
-    few = frames[:: max(1, len(frames) // 6)]
-    strip = Image.new("RGB", (few[0].width, few[0].height * len(few)))
-    for k, frame in enumerate(few):
-        strip.paste(frame, (0, k * frame.height))
-    palette = strip.quantize(256, Image.Quantize.MEDIANCUT)
-    flat = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-    flat[0].save(path, save_all=True, append_images=flat[1:], duration=round(1000 / rate), loop=0, optimize=False)
-
-
-def _write_mp4(images: Iterator[Pixels], path: Path, rate: float) -> None:
-    try:
-        import imageio_ffmpeg
-    except ImportError:
-        raise InputError(
-            f"{path.name}: an .mp4 needs imageio-ffmpeg (pip install imageio-ffmpeg); a .gif needs nothing"
-        ) from None
-    writer = None
-    for image in images:
-        even = np.ascontiguousarray(image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2])
-        if writer is None:
-            writer = imageio_ffmpeg.write_frames(
-                str(path), (even.shape[1], even.shape[0]), fps=rate, codec="libx264", quality=8, macro_block_size=2
-            )
-            writer.send(None)
-        writer.send(even)
-    if writer is not None:
-        writer.close()

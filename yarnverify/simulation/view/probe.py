@@ -34,19 +34,23 @@ def why_not() -> str | None:
     if importlib.util.find_spec("pyvista") is None:
         return "pyvista is not installed (pip install 'yarnverify[view]'): matplotlib draws instead"
     without_display()
-    if _renders(os.environ):
-        return None
-    if sys.platform.startswith("linux") and os.environ.get(_WINDOW) != _EGL and _renders({**os.environ, _WINDOW: _EGL}):
-        os.environ[_WINDOW] = _EGL  # there is a display, but not one that draws
-        return None
-    return f"VTK cannot render here (on Debian: apt install {PACKAGES}): matplotlib draws instead"
+    failed = _failure(os.environ)
+    if failed and sys.platform.startswith("linux") and os.environ.get(_WINDOW) != _EGL:
+        if not _failure({**os.environ, _WINDOW: _EGL}):  # there is a display, but not one that draws
+            os.environ[_WINDOW] = _EGL
+            return None
+    if failed and "ImportError" in failed:
+        return f"pyvista cannot be imported here ({failed}): matplotlib draws instead"
+    return f"VTK cannot render here (on Debian: apt install {PACKAGES}): matplotlib draws instead" if failed else None
 
 
-def _renders(environment: Mapping[str, str]) -> bool:
+def _failure(environment: Mapping[str, str]) -> str:
+    """Empty where a picture could be made, else the last line that was said."""
     try:
-        trial = subprocess.run(
-            [sys.executable, "-c", _TRIAL], capture_output=True, text=True, timeout=120, env=dict(environment)
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return False
-    return trial.returncode == 0 and trial.stdout.strip().endswith("rendered")
+        command = [sys.executable, "-c", _TRIAL]
+        trial = subprocess.run(command, capture_output=True, text=True, timeout=120, env=dict(environment))
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return str(error)
+    if trial.returncode == 0 and trial.stdout.strip().endswith("rendered"):
+        return ""
+    return (trial.stderr.strip().splitlines() or ["it ended without a word"])[-1]

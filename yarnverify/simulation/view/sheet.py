@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,8 @@ class Sheet:
         from matplotlib.figure import Figure
 
         self.size = size
-        self.figure = Figure(figsize=(size[0] / 200, size[1] / 200), dpi=200, facecolor="white")
+        dots = size[1] / 6  # an inch: writing keeps its share of the picture
+        self.figure = Figure(figsize=(size[0] / dots, 6), dpi=dots, facecolor="white")
         self.canvas = FigureCanvasAgg(self.figure)
         self.image: Any = None
         self.axes = self.figure.add_axes((0, 0, 1, 1))
@@ -97,7 +99,8 @@ class Sheet:
         bar.tick_params(labelsize=7, width=0.5, length=2.5, colors=INK)
         for spine in bar.spines.values():
             spine.set_linewidth(0.5)
-        self.figure.text(0.894, 0.79, measure.label, fontsize=8, color=INK, ha="center", va="bottom")
+        label = fill(measure.name, 16) + (f"\n({measure.unit})" if measure.unit else "")
+        self.figure.text(0.915, 0.79, label, fontsize=8, color=INK, ha="center", va="bottom", linespacing=1.3)
 
     def _families(self, fabric: Fabric) -> None:
         from matplotlib.patches import Rectangle

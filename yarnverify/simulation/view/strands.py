@@ -5,6 +5,7 @@ to its side, and swings over from crossing to crossing. If the yarns meet at the
 other, the squared distance of their centre lines s and t away from the crossing is
 4 R^2 + (1 - 2 R k)(s^2 + t^2) - 2 s t cos(phi) + ..., so that they touch there without overlap where
 k <= (1 - |cos(phi)|) / (2 R). The swing is a cosine as long as that holds, and flatter at its ends where it would not.
+Where a dense cloth is sheared so far that there is no room for its yarns, they overlap, for the configuration does.
 """
 
 from __future__ import annotations
