@@ -134,11 +134,11 @@ def _sides(fabric: Fabric, points: Numbers) -> tuple[Numbers, Numbers, Numbers]:
         sides[places] = sign * fabric.over * fabric.R
         normals[places] = normal
         bounds[places] = bound
-    lone = np.flatnonzero(~normals.any(1))  # ends without a crossing take their neighbour's
+    lone = np.flatnonzero(~normals.any(1))  # a tail goes straight on from the last crossing
     for shift in (1, -1):
         near = np.clip(lone + shift, 0, len(chain.nodes) - 1)
         usable = (chain.yarn[near] == chain.yarn[lone]) & ~normals[lone].any(1)
-        normals[lone[usable]] = normals[near[usable]]
+        normals[lone[usable]], sides[lone[usable]] = normals[near[usable]], sides[near[usable]]
     return sides, normals, bounds
 
 
