@@ -352,6 +352,26 @@ def test_without_pyvista_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> 
         why_not.cache_clear()
 
 
+def test_the_reason_is_told_once(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("yarnverify.simulation.view.drawing.why_not", lambda: "VTK cannot render here (on Debian: ...)")
+    probe.tell.cache_clear()
+    cloth = weave("plain", (2, 2))
+    for _ in range(2):
+        picture(cloth, cloth.Q, tmp_path / "p.png", size=SMALL)
+    assert [record.message for record in caplog.records] == ["VTK cannot render here (on Debian: ...)"]
+
+
+def test_without_matplotlib_nothing_is_drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(probe.importlib.util, "find_spec", lambda name: None)
+    cloth = weave("plain", (2, 2))
+    for draw, name in ((picture, "p.png"), (scene, "s.html"), (turntable, "t.gif")):
+        with pytest.raises(NotRunError, match="pip install 'yarnverify"):
+            draw(cloth, cloth.Q, tmp_path / name)
+    Series(cloth, tmp_path / "run.pvd").write(0.0, cloth.Q)  # needs neither
+
+
 def test_nothing_that_draws_is_imported_before_a_picture_is_made() -> None:
     code = (
         "import sys, yarnverify.simulation.fabric, yarnverify.simulation.view\n"

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from yarnverify.simulation.cloth import Fabric
 from yarnverify.simulation.view.camera import Camera
 from yarnverify.simulation.view.measures import Measure
-from yarnverify.simulation.view.probe import why_not, without_display
+from yarnverify.simulation.view.probe import tell, why_not, without_display
 from yarnverify.simulation.view.strands import Strands, strands
 from yarnverify.simulation.view.tubes import Tubes, tubes
 
@@ -84,8 +84,10 @@ def table_of(signed: bool) -> Pixels:
 
 def pixels(body: Body, seen: Camera, size: tuple[int, int]) -> Pixels:
     """The picture alone, without any writing, (height, width, 3): by VTK, or by matplotlib where that cannot render."""
-    if why_not() is None:
+    reason = why_not()
+    if reason is None:
         return _by_vtk(body, seen, size)
+    tell(reason)
     from yarnverify.simulation.view.flat import drawn
 
     return drawn(body, seen, size)

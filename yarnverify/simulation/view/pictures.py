@@ -15,6 +15,7 @@ from yarnverify.simulation.view.drawing import FAMILIES, Body, Pixels, body, pix
 from yarnverify.simulation.view.files import whole
 from yarnverify.simulation.view.measures import Measure, measure, shown
 from yarnverify.simulation.view.movies import write_movie
+from yarnverify.simulation.view.probe import required
 from yarnverify.simulation.view.sheet import BOTTOM, RIGHT, TOP, Sheet
 
 Colour = str | Measure | None
@@ -50,7 +51,13 @@ def picture(
         Written above, at the left and at the right.
     size
         Width and height in pixels.
+
+    Raises
+    ------
+    NotRunError
+        The extra ``view`` is not installed, or the file cannot be written.
     """
+    required()
     chosen = _chosen(fabric, Q, colour)
     drawn = body(fabric, Q, chosen, limits, **_fineness(fabric))
     seen = camera([drawn.tubes.points], view, aspect=size[0] / size[1], room=ROOM)
@@ -94,6 +101,7 @@ def movie(
     InputError
         No frames, or a file name that does not end in .gif or .mp4.
     """
+    required()
     path = Path(path)
     if path.suffix not in (".gif", ".mp4"):
         raise InputError(f"{path.name}: a movie ends in .gif or .mp4")

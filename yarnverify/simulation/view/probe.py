@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
+import logging
 import os
 import subprocess
 import sys
 from collections.abc import Mapping
 from functools import cache
+
+from yarnverify.errors import NotRunError
 
 PACKAGES = "libegl1 libgl1-mesa-dri"  # Debian: EGL without a display, and Mesa's renderer for processors
 _WINDOW, _EGL = "VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow"
@@ -26,6 +29,18 @@ def without_display() -> None:
     """Make VTK render without a display where there is none. Has to come before the first import of VTK."""
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         os.environ.setdefault(_WINDOW, _EGL)
+
+
+def required() -> None:
+    """Refuse, in one line, where not even matplotlib is installed, which writes legends as well."""
+    if importlib.util.find_spec("matplotlib") is None:
+        raise NotRunError("pictures need the extra view: pip install 'yarnverify[view]'")
+
+
+@cache
+def tell(reason: str) -> None:
+    """Log a reason, once a process."""
+    logging.getLogger("yarnverify").warning(reason)
 
 
 @cache

@@ -20,6 +20,7 @@ from yarnverify.simulation.view.drawing import FAMILIES, UNKNOWN, table_of
 from yarnverify.simulation.view.files import whole
 from yarnverify.simulation.view.measures import MEASURES, Measure, measure
 from yarnverify.simulation.view.pictures import time_note
+from yarnverify.simulation.view.probe import required
 from yarnverify.simulation.view.strands import strands
 
 _LEVELS = 254  # 255 means that there is no value
@@ -52,6 +53,7 @@ def scene(
     detail, sides
         Samples a segment and faces around a yarn.
     """
+    required()
     several = np.atleast_2d(np.asarray(frames, float))
     if several.ndim != 2 or several.shape[1] != fabric.size or not len(several):
         raise InputError(f"a scene needs configurations of {fabric.size} numbers; got an array {several.shape}")

@@ -99,6 +99,8 @@ class Sheet:
         bar.tick_params(labelsize=7, width=0.5, length=2.5, colors=INK)
         for spine in bar.spines.values():
             spine.set_linewidth(0.5)
+        if not np.isfinite(measure.values).all() and measure.at == "segments":  # an end of a yarn takes a node's value
+            self.figure.text(0.894, 0.2, "grey: none", fontsize=7, color=INK, ha="center")
         label = fill(measure.name, 16) + (f"\n({measure.unit})" if measure.unit else "")
         self.figure.text(0.915, 0.79, label, fontsize=8, color=INK, ha="center", va="bottom", linespacing=1.3)
 
