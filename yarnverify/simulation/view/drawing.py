@@ -75,10 +75,11 @@ def families_of(fabric: Fabric) -> list[str]:
 
 @cache
 def table_of(signed: bool) -> Pixels:
-    """The 256 colours of a scale, (256, 3): both keep their order in grey and for the colour-blind."""
+    """The 256 colours of a scale, (256, 3): both keep their order for the colour-blind, and show the shape at zero."""
     import matplotlib
 
-    made = matplotlib.colormaps["coolwarm" if signed else "viridis"](np.arange(256), bytes=True)
+    name, low, high = ("coolwarm", 0.0, 1.0) if signed else ("YlOrRd", 0.04, 0.92)
+    made = matplotlib.colormaps[name](np.linspace(low, high, 256), bytes=True)
     return np.asarray(made[:, :3], np.uint8)
 
 

@@ -60,6 +60,12 @@ class Measure:
             (-most, most) if self.signed else (min(float(known.min(initial=0.0)), 0.0), float(known.max(initial=0.0)))
         )
 
+    def lacking(self, fabric: Fabric) -> bool:
+        """Whether some yarn is left without a colour."""
+        first, second = fabric.chain.pairs
+        none = np.isnan(self.values)
+        return bool((none[first] if self.at == "segments" else none[first] & none[second]).any())
+
     def on_samples(self, strands: Strands) -> Numbers:
         """Values at the samples of strands, (m,)."""
         here = self.values[strands.place]

@@ -133,6 +133,7 @@ def _measured(fabric: Fabric, frames: NDArray[np.float64], lines: Sequence[Any],
     return {
         "name": found[0].name,
         "label": found[0].label,
+        "lacking": found[0].lacking(fabric),
         "colours": [*colours.tolist(), list(UNKNOWN)],
         "values": _packed(levels.astype(np.uint8)),
         "stepped": found[0].at == "segments",

@@ -53,7 +53,7 @@ class Sheet:
         if measure is None:
             self._families(fabric)
         else:
-            self._colour_bar(measure, limits or measure.limits)
+            self._colour_bar(fabric, measure, limits or measure.limits)
 
     def compose(self, picture: NDArray[np.uint8], note: str = "") -> NDArray[np.uint8]:
         """The picture with its writing, (height, width, 3)."""
@@ -82,7 +82,7 @@ class Sheet:
             left + share / 2, low + 0.012, _length(length), fontsize=8, color=INK, ha="center", va="bottom"
         )
 
-    def _colour_bar(self, measure: Measure, limits: tuple[float, float]) -> None:
+    def _colour_bar(self, fabric: Fabric, measure: Measure, limits: tuple[float, float]) -> None:
         from matplotlib.ticker import MaxNLocator
 
         low, high = limits
@@ -99,7 +99,7 @@ class Sheet:
         bar.tick_params(labelsize=7, width=0.5, length=2.5, colors=INK)
         for spine in bar.spines.values():
             spine.set_linewidth(0.5)
-        if not np.isfinite(measure.values).all() and measure.at == "segments":  # an end of a yarn takes a node's value
+        if measure.lacking(fabric):
             self.figure.text(0.894, 0.2, "grey: none", fontsize=7, color=INK, ha="center")
         label = fill(measure.name, 16) + (f"\n({measure.unit})" if measure.unit else "")
         self.figure.text(0.915, 0.79, label, fontsize=8, color=INK, ha="center", va="bottom", linespacing=1.3)
