@@ -37,6 +37,19 @@ def outside(names: set[str], allowed: tuple[str, ...]) -> set[str]:
 RULES = [
     ("kernels", ("numpy", "yarnverify.kernels")),
     ("report", ("jinja2", "matplotlib", "yarnverify.report")),
+    (
+        "simulation/view",
+        (
+            "numpy",
+            "scipy",
+            "matplotlib",
+            "pyvista",
+            "PIL",
+            "imageio_ffmpeg",
+            "yarnverify.errors",
+            "yarnverify.simulation",
+        ),
+    ),
 ]
 
 
@@ -91,7 +104,9 @@ def test_nothing_heavy_is_imported_for_help() -> None:
 
 def test_peers_and_pictures_are_imported_only_where_they_are_wanted() -> None:
     for path in sorted(PACKAGE.rglob("*.py")):
-        allowed = {"peers": ("jax", "casadi", "numba"), "report": ("matplotlib",)}.get(path.parent.name, ())
+        allowed = {"peers": ("jax", "casadi", "numba"), "report": ("matplotlib",), "view": ("matplotlib",)}.get(
+            path.parent.name, ()
+        )
         for name in ("jax", "casadi", "numba", "matplotlib"):
             assert name in allowed or not any(found.split(".")[0] == name for found in imports(path)), path
     code = (

@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from yarnverify.simulation.cloth import Fabric
 from yarnverify.simulation.view.camera import Camera
 from yarnverify.simulation.view.measures import Measure
-from yarnverify.simulation.view.probe import why_not, without_display
+from yarnverify.simulation.view.probe import tell, why_not, without_display
 from yarnverify.simulation.view.strands import Strands, strands
 from yarnverify.simulation.view.tubes import Tubes, tubes
 
 Pixels = NDArray[np.uint8]
-FAMILIES = {"warp": (38, 70, 109), "weft": (222, 196, 150), "yarn": (178, 76, 56)}  # indigo, ecru, madder
+FAMILIES = {"warp": (46, 84, 130), "weft": (222, 196, 150), "yarn": (178, 76, 56)}  # indigo, ecru, madder
 UNKNOWN = (190, 190, 190)  # where a measure has no value
 
 
@@ -68,19 +68,27 @@ def colours_of(values: NDArray[np.float64], limits: tuple[float, float], signed:
     return np.where(np.isfinite(values)[:, None], found, np.array(UNKNOWN, np.uint8))
 
 
+def families_of(fabric: Fabric) -> list[str]:
+    """Families that a legend has to tell apart."""
+    return [name for name in ("warp", "weft") if any(y.family == name for y in fabric.yarns)]
+
+
 @cache
 def table_of(signed: bool) -> Pixels:
-    """The 256 colours of a scale, (256, 3): both keep their order in grey and for the colour-blind."""
+    """The 256 colours of a scale, (256, 3): both keep their order for the colour-blind, and show the shape at zero."""
     import matplotlib
 
-    made = matplotlib.colormaps["coolwarm" if signed else "viridis"](np.arange(256), bytes=True)
+    name, low, high = ("coolwarm", 0.0, 1.0) if signed else ("YlOrRd", 0.04, 0.92)
+    made = matplotlib.colormaps[name](np.linspace(low, high, 256), bytes=True)
     return np.asarray(made[:, :3], np.uint8)
 
 
 def pixels(body: Body, seen: Camera, size: tuple[int, int]) -> Pixels:
     """The picture alone, without any writing, (height, width, 3): by VTK, or by matplotlib where that cannot render."""
-    if why_not() is None:
+    reason = why_not()
+    if reason is None:
         return _by_vtk(body, seen, size)
+    tell(reason)
     from yarnverify.simulation.view.flat import drawn
 
     return drawn(body, seen, size)
@@ -89,7 +97,7 @@ def pixels(body: Body, seen: Camera, size: tuple[int, int]) -> Pixels:
 def _by_vtk(body: Body, seen: Camera, size: tuple[int, int]) -> Pixels:
     plotter = plotter_of(body, seen, size)
     try:
-        return np.asarray(plotter.screenshot(return_img=True), np.uint8)[..., :3]
+        return np.asarray(plotter.screenshot(None, return_img=True), np.uint8)[..., :3]
     finally:
         plotter.close()
 

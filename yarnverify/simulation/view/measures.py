@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -32,6 +33,8 @@ class Measure:
         blending into the next one.
     signed
         Whether zero is the middle of the scale.
+    least
+        Below it in size all is rounding, and a scale is that of zero.
     """
 
     name: str
@@ -39,6 +42,7 @@ class Measure:
     values: Numbers
     at: Literal["segments", "nodes"]
     signed: bool = False
+    least: float = 0.0
 
     @property
     def label(self) -> str:
@@ -50,9 +54,17 @@ class Measure:
         """Least and greatest value for a scale: symmetric about zero where signed, else from zero."""
         known = self.values[np.isfinite(self.values)]
         most = float(np.abs(known).max(initial=0.0))
+        if most <= self.least:
+            return (0.0, 0.0)
         return (
             (-most, most) if self.signed else (min(float(known.min(initial=0.0)), 0.0), float(known.max(initial=0.0)))
         )
+
+    def lacking(self, fabric: Fabric) -> bool:
+        """Whether some yarn is left without a colour."""
+        first, second = fabric.chain.pairs
+        none = np.isnan(self.values)
+        return bool((none[first] if self.at == "segments" else none[first] & none[second]).any())
 
     def on_samples(self, strands: Strands) -> Numbers:
         """Values at the samples of strands, (m,)."""
@@ -68,13 +80,15 @@ def strain(fabric: Fabric, Q: ArrayLike) -> Measure:
     """Strain of each segment, per cent of its rest length."""
     made, q = _elements(fabric, Q, segments)
     strained = np.linalg.norm(q[3:6] - q[:3], axis=0) / (q[7] - q[6]) - 1
-    return Measure("stretch", "%", _at(fabric, made, 100 * strained), "segments", signed=True)
+    return Measure("stretch", "%", _at(fabric, made, 100 * strained), "segments", True, 1e-9)
 
 
 def turning(fabric: Fabric, Q: ArrayLike) -> Measure:
     """Turning angle of each yarn at its nodes, degrees."""
     made, q = _elements(fabric, Q, bends)
-    return Measure("bending angle", "°", _at(fabric, made, np.degrees(_angle(q[3:6] - q[:3], q[:3] - q[6:9]))), "nodes")
+    return Measure(
+        "bending angle", "°", _at(fabric, made, np.degrees(_angle(q[3:6] - q[:3], q[:3] - q[6:9]))), "nodes", least=1e-5
+    )
 
 
 def shearing(fabric: Fabric, Q: ArrayLike) -> Measure:
@@ -84,14 +98,14 @@ def shearing(fabric: Fabric, Q: ArrayLike) -> Measure:
     count = np.bincount(made.places["node"], minlength=fabric.nodes)
     total = np.bincount(made.places["node"], away, fabric.nodes)
     mean = np.divide(total, count, out=np.full(fabric.nodes, np.nan), where=count > 0)
-    return Measure("shear", "°", mean[fabric.chain.nodes], "nodes")
+    return Measure("shear", "°", mean[fabric.chain.nodes], "nodes", least=1e-5)
 
 
 def pressing(fabric: Fabric, Q: ArrayLike) -> Measure:
     """How far neighbouring parallel yarns overlap, millimetres, on the piece of yarn that lies between them."""
     made, q = _elements(fabric, Q, contacts)
     overlap = np.maximum(made.parameters["d"] - (q[1] - q[0]), 0.0)
-    return Measure("contact", "mm overlap", _at(fabric, made, 1e3 * overlap), "segments")
+    return Measure("contact", "mm overlap", _at(fabric, made, 1e3 * overlap), "segments", least=1e-12)
 
 
 def energy(fabric: Fabric, table: Table, energies: ArrayLike, name: str) -> Measure:
@@ -138,8 +152,13 @@ def shown(measure: Measure) -> Measure:
     return replace(measure, unit=prefix + measure.unit, values=measure.values / 10.0 ** (3 * power))
 
 
+@lru_cache(maxsize=8)  # a run asks for the same ones at every step
+def _table(of: Callable[[Fabric], Table], fabric: Fabric) -> Table:
+    return of(fabric)
+
+
 def _elements(fabric: Fabric, Q: ArrayLike, of: Callable[[Fabric], Table]) -> tuple[Table, Numbers]:
-    made = of(fabric)
+    made = _table(of, fabric)
     return made, np.asarray(Q, float)[made.rows]
 
 

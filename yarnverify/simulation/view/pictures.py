@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from yarnverify.errors import InputError
 from yarnverify.simulation.cloth import Fabric
 from yarnverify.simulation.view.camera import Camera, camera
-from yarnverify.simulation.view.drawing import Body, Pixels, body, pixels
+from yarnverify.simulation.view.drawing import FAMILIES, Body, Pixels, body, pixels, table_of
+from yarnverify.simulation.view.files import whole
 from yarnverify.simulation.view.measures import Measure, measure, shown
+from yarnverify.simulation.view.movies import write_movie
+from yarnverify.simulation.view.probe import required
 from yarnverify.simulation.view.sheet import BOTTOM, RIGHT, TOP, Sheet
 
 Colour = str | Measure | None
@@ -50,7 +51,13 @@ def picture(
         Written above, at the left and at the right.
     size
         Width and height in pixels.
+
+    Raises
+    ------
+    NotRunError
+        The extra ``view`` is not installed, or the file cannot be written.
     """
+    required()
     chosen = _chosen(fabric, Q, colour)
     drawn = body(fabric, Q, chosen, limits, **_fineness(fabric))
     seen = camera([drawn.tubes.points], view, aspect=size[0] / size[1], room=ROOM)
@@ -94,6 +101,7 @@ def movie(
     InputError
         No frames, or a file name that does not end in .gif or .mp4.
     """
+    required()
     path = Path(path)
     if path.suffix not in (".gif", ".mp4"):
         raise InputError(f"{path.name}: a movie ends in .gif or .mp4")
@@ -111,12 +119,13 @@ def movie(
     clouds = (drawn.strands.points for drawn in bodies())
     seen = camera(clouds, view, aspect=size[0] / size[1], room=ROOM, margin=fabric.R, turning=turn != 0)
     sheet = Sheet(fabric, size, seen, measures[0], scale, title)
-    notes = [""] * len(frames) if times is None else [_time(t, max(map(abs, times))) for t in times]
+    notes = [""] * len(frames) if times is None else [time_note(t, max(map(abs, times))) for t in times]
     images = (
         sheet.compose(pixels(drawn, _turned(seen, turn * k / len(frames)), size), note)
         for k, (drawn, note) in enumerate(zip(bodies(), notes, strict=True))
     )
-    return _write_movie(images, path, rate)
+    keep = np.array(list(FAMILIES.values()), np.uint8) if measures[0] is None else table_of(measures[0].signed)[::4]
+    return write_movie(images, path, rate, keep)
 
 
 def turntable(
@@ -157,74 +166,17 @@ def _fineness(fabric: Fabric, moving: bool = False) -> dict[str, int]:
     return {"detail": 4, "sides": 6}
 
 
-def _time(t: float, most: float) -> str:
+def time_note(t: float, most: float) -> str:
+    """A time in seconds with the unit that suits the latest one."""
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
         if most >= size:
             return f"t = {t / size:.{2 if unit == 's' else 1}f} {unit}"
     return f"t = {t:.3g} s"
 
 
-# -- files ------------------------------------------------------------------------------------------------------------
-
-
-@contextmanager
-def _whole(path: Path) -> Iterator[Path]:
-    """A name to write to beside the wanted one, moved there once all is written."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.stem}.part{path.suffix}")
-    try:
-        yield part
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
 def _save(image: Pixels, path: Path) -> Path:
     from PIL import Image
 
-    with _whole(path) as part:
+    with whole(path) as part:
         Image.fromarray(image).save(part)
     return path
-
-
-def _write_movie(images: Iterator[NDArray[np.uint8]], path: Path, rate: float) -> Path:
-    with _whole(path) as part:
-        if path.suffix == ".mp4":
-            _write_mp4(images, part, rate)
-        else:
-            _write_gif(images, part, rate)
-    return path
-
-
-def _write_gif(images: Iterator[Pixels], path: Path, rate: float) -> None:
-    from PIL import Image
-
-    frames = [Image.fromarray(image) for image in images]
-    # one palette for all frames, from several of them: colours keep their meaning and nothing flickers
-    few = frames[:: max(1, len(frames) // 6)]
-    strip = Image.new("RGB", (few[0].width, few[0].height * len(few)))
-    for k, frame in enumerate(few):
-        strip.paste(frame, (0, k * frame.height))
-    palette = strip.quantize(256, Image.Quantize.MEDIANCUT)
-    flat = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-    flat[0].save(path, save_all=True, append_images=flat[1:], duration=round(1000 / rate), loop=0, optimize=False)
-
-
-def _write_mp4(images: Iterator[Pixels], path: Path, rate: float) -> None:
-    try:
-        import imageio_ffmpeg
-    except ImportError:
-        raise InputError(
-            f"{path.name}: an .mp4 needs imageio-ffmpeg (pip install imageio-ffmpeg); a .gif needs nothing"
-        ) from None
-    writer = None
-    for image in images:
-        even = np.ascontiguousarray(image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2])
-        if writer is None:
-            writer = imageio_ffmpeg.write_frames(
-                str(path), (even.shape[1], even.shape[0]), fps=rate, codec="libx264", quality=8, macro_block_size=2
-            )
-            writer.send(None)
-        writer.send(even)
-    if writer is not None:
-        writer.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from yarnverify.simulation.cloth import Fabric
 from yarnverify.simulation.view.camera import Camera
-from yarnverify.simulation.view.drawing import FAMILIES, table_of
+from yarnverify.simulation.view.drawing import FAMILIES, families_of, table_of
 from yarnverify.simulation.view.measures import Measure
 
 INK = "#222222"
@@ -40,7 +41,8 @@ class Sheet:
         from matplotlib.figure import Figure
 
         self.size = size
-        self.figure = Figure(figsize=(size[0] / 200, size[1] / 200), dpi=200, facecolor="white")
+        dots = size[1] / 6  # an inch: writing keeps its share of the picture
+        self.figure = Figure(figsize=(size[0] / dots, 6), dpi=dots, facecolor="white")
         self.canvas = FigureCanvasAgg(self.figure)
         self.image: Any = None
         self.axes = self.figure.add_axes((0, 0, 1, 1))
@@ -51,7 +53,7 @@ class Sheet:
         if measure is None:
             self._families(fabric)
         else:
-            self._colour_bar(measure, limits or measure.limits)
+            self._colour_bar(fabric, measure, limits or measure.limits)
 
     def compose(self, picture: NDArray[np.uint8], note: str = "") -> NDArray[np.uint8]:
         """The picture with its writing, (height, width, 3)."""
@@ -80,7 +82,7 @@ class Sheet:
             left + share / 2, low + 0.012, _length(length), fontsize=8, color=INK, ha="center", va="bottom"
         )
 
-    def _colour_bar(self, measure: Measure, limits: tuple[float, float]) -> None:
+    def _colour_bar(self, fabric: Fabric, measure: Measure, limits: tuple[float, float]) -> None:
         from matplotlib.ticker import MaxNLocator
 
         low, high = limits
@@ -97,13 +99,15 @@ class Sheet:
         bar.tick_params(labelsize=7, width=0.5, length=2.5, colors=INK)
         for spine in bar.spines.values():
             spine.set_linewidth(0.5)
-        self.figure.text(0.894, 0.79, measure.label, fontsize=8, color=INK, ha="center", va="bottom")
+        if measure.lacking(fabric):
+            self.figure.text(0.894, 0.2, "grey: none", fontsize=7, color=INK, ha="center")
+        label = fill(measure.name, 16) + (f"\n({measure.unit})" if measure.unit else "")
+        self.figure.text(0.915, 0.79, label, fontsize=8, color=INK, ha="center", va="bottom", linespacing=1.3)
 
     def _families(self, fabric: Fabric) -> None:
         from matplotlib.patches import Rectangle
 
-        present = [name for name in FAMILIES if name != "yarn" and any(y.family == name for y in fabric.yarns)]
-        for row, name in enumerate(present):
+        for row, name in enumerate(families_of(fabric)):
             y = 0.54 - 0.05 * row
             colour = tuple(c / 255 for c in FAMILIES[name])
             self.figure.add_artist(

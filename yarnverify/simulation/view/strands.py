@@ -5,6 +5,7 @@ to its side, and swings over from crossing to crossing. If the yarns meet at the
 other, the squared distance of their centre lines s and t away from the crossing is
 4 R^2 + (1 - 2 R k)(s^2 + t^2) - 2 s t cos(phi) + ..., so that they touch there without overlap where
 k <= (1 - |cos(phi)|) / (2 R). The swing is a cosine as long as that holds, and flatter at its ends where it would not.
+Where a dense cloth is sheared so far that there is no room for its yarns, they overlap, for the configuration does.
 """
 
 from __future__ import annotations
@@ -133,11 +134,11 @@ def _sides(fabric: Fabric, points: Numbers) -> tuple[Numbers, Numbers, Numbers]:
         sides[places] = sign * fabric.over * fabric.R
         normals[places] = normal
         bounds[places] = bound
-    lone = np.flatnonzero(~normals.any(1))  # ends without a crossing take their neighbour's
+    lone = np.flatnonzero(~normals.any(1))  # a tail goes straight on from the last crossing
     for shift in (1, -1):
         near = np.clip(lone + shift, 0, len(chain.nodes) - 1)
         usable = (chain.yarn[near] == chain.yarn[lone]) & ~normals[lone].any(1)
-        normals[lone[usable]] = normals[near[usable]]
+        normals[lone[usable]], sides[lone[usable]] = normals[near[usable]], sides[near[usable]]
     return sides, normals, bounds
 
 
