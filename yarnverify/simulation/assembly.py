@@ -47,7 +47,7 @@ class Term:
 
     kernel: Any
     table: Table
-    parameters: Mapping[str, ArrayLike] = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -79,7 +79,7 @@ class Worst(NamedTuple):
     """The element that holds most of the greatest residual."""
 
     term: str
-    index: int
+    element: int
     energy: float
     state: Array
 
@@ -302,9 +302,8 @@ class System:
 
     def _run(self, term: Term, wanted: str, q: Array, part: Any, fresh: bool = False) -> list[Array]:
         start = perf_counter()
-        out = None if fresh else [self._output(*q.shape)["EGH".index(key)] for key in wanted]
-        if out is not None and len(out) == 1:
-            out = out[0]
+        kept = [] if fresh else [self._output(*q.shape)["EGH".index(key)] for key in wanted]
+        out: Any = None if fresh else kept if len(kept) > 1 else kept[0]
         try:
             found = Batch(term.kernel.KERNEL, wanted, q, term.some(part), out=out, engine=self.engine).results()
         except ElementError as error:

@@ -34,9 +34,17 @@ NARROW = 24  # band up to which banded Cholesky beats fronts
 class Problem(Protocol):
     """What can be minimised: a system, or a step of a motion."""
 
-    active: Array
-    nodes: Array
-    coordinates: Array | None
+    @property
+    def active(self) -> Array:
+        """Indices of the unknowns."""
+
+    @property
+    def nodes(self) -> Array:
+        """Node of each unknown."""
+
+    @property
+    def coordinates(self) -> Array | None:
+        """Coordinates of the nodes, where all have some."""
 
     def energy(self, Q: Array) -> float:
         """Energy of a configuration."""
@@ -104,14 +112,14 @@ class NotConverged(ArithmeticError):
     history
         All iterations.
     worst
-        The element that holds most of the greatest residual there: its term, index, energy and state.
+        The element that holds most of the greatest residual there: its term, element, energy and state.
     """
 
     def __init__(self, reason: str, Q: Array, history: list[Iteration], worst: Worst | None) -> None:
         residuals = ", ".join(f"{line.residual:.1e}" for line in history[-5:])
         text = f"{reason}; last residuals {residuals} N"
         if worst is not None:
-            text += f"; worst element: {worst.term} {worst.index}, energy {worst.energy:.3e} J, state {worst.state.tolist()}"
+            text += f"; worst element: {worst.term} {worst.element}, energy {worst.energy:.3e} J, state {worst.state.tolist()}"
         super().__init__(text)
         self.Q, self.history, self.worst = Q, history, worst
 
@@ -163,6 +171,14 @@ class Search:
     history: list[Iteration] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=lambda: {"evaluation": 0.0, "solve": 0.0})
     departures: int = 0
+    _next: Evaluation | None = None
+    _lowest: Array = field(default_factory=lambda: np.empty(0))
+    _lowest_energy: float = np.inf
+    _energy: float = np.inf
+    _residual: float = np.inf
+    _step: float = np.inf
+    _stale: int = 0
+    _fulls: int = 0
 
     @one_thread()
     def run(self) -> Equilibrium:
