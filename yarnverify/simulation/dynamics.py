@@ -73,8 +73,13 @@ class Motion:
     def of(arrays: Mapping[str, Any]) -> Motion:
         """From what ``arrays`` gave."""
         numbers = {"steps": int, "rejected": int}
-        return Motion(**{f.name: np.array(arrays[f.name], float) if np.ndim(arrays[f.name])
-                         else numbers.get(f.name, float)(arrays[f.name]) for f in fields(Motion)})  # fmt: skip
+        found: dict[str, Any] = {
+            f.name: np.array(arrays[f.name], float)
+            if np.ndim(arrays[f.name])
+            else numbers.get(f.name, float)(arrays[f.name])
+            for f in fields(Motion)
+        }
+        return Motion(**found)
 
 
 class Dynamics:

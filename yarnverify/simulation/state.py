@@ -51,10 +51,15 @@ def save(path: str | os.PathLike[str], *, identity: str = "", **arrays: ArrayLik
     """
     path = Path(path)
     temporary = None
+    named: dict[str, Any] = {"format": np.array(FORMAT), "identity": np.array(identity)}
+    named |= {name: np.asarray(values) for name, values in arrays.items()}
+    for name, values in named.items():
+        if values.dtype.hasobject:
+            raise TypeError(f"the state {name} cannot be saved: {values.dtype} is not an array of numbers")
     try:
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
             temporary = Path(file.name)
-            np.savez(file, **{"format": FORMAT, "identity": identity, **arrays})
+            np.savez(file, **named)
             file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, path)
