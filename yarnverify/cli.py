@@ -146,12 +146,13 @@ def generate(
     *,
     check: Annotated[bool, Parameter(negative="", help="Compare with the files instead of writing them.")] = False,
     json_file: Json = None,
+    cache: Annotated[bool, Parameter(help="Use and keep results that are already known.")] = True,
 ) -> None:
     """The kernels, from the derivations."""
     from yarnverify.generation import generate_kernels
 
     with progress("generating") as advance:
-        outcome = generate_kernels(check, advance)
+        outcome = generate_kernels(check, advance, cache)
     _finish(outcome, json_file)
 
 
