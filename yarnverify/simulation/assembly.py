@@ -8,11 +8,11 @@ Elements go through kernel and sum a chunk at a time, in memory that is kept: no
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from time import perf_counter
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,67 +21,16 @@ from scipy import sparse
 from yarnverify.kernels import ElementError
 from yarnverify.kernels.batch import Batch
 from yarnverify.simulation import scatter
+from yarnverify.simulation.owners import owners
 from yarnverify.simulation.pattern import Elements, Pattern, zeros
+from yarnverify.simulation.problem import Evaluation, Worst
 from yarnverify.simulation.semidefinite import ALONE, Form, eigenvalues, form_of
-from yarnverify.simulation.tables import Table
+from yarnverify.simulation.terms import Term
+
+__all__ = ["CHUNK", "Evaluation", "System", "Term", "Worst"]
 
 Array = NDArray[Any]
 CHUNK = 8192
-
-
-@dataclass(frozen=True, eq=False)
-class Term:
-    """One energy on all elements of a table.
-
-    Attributes
-    ----------
-    kernel
-        A module of ``yarnverify.kernels`` or one like it (``DOFS``, ``PARAMETERS``, ``KERNEL``, ``packed``).
-    table
-        The elements.
-    parameters
-        Values of the kernel's parameters that the table does not know, each a number or (n,).
-    name
-        The kernel's, unless given.
-    """
-
-    kernel: Any
-    table: Table
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    name: str = ""
-
-    def __post_init__(self) -> None:
-        if not self.name:
-            object.__setattr__(self, "name", self.kernel.KERNEL.name)
-        values = {**self.table.parameters, **self.parameters}
-        missing, unknown = set(self.kernel.PARAMETERS) - set(values), set(self.parameters) - set(self.kernel.PARAMETERS)
-        if missing or unknown:
-            wrong = ", ".join(sorted(missing or unknown))
-            raise ValueError(f"{self.name}: {'needs' if missing else 'has no'} parameter {wrong}")
-        object.__setattr__(self, "parameters", {k: np.asarray(values[k], float) for k in self.kernel.PARAMETERS})
-
-    def some(self, part: Any) -> dict[str, Any]:
-        """Parameters of some elements."""
-        vectors = self.kernel.KERNEL.vectors
-        return {k: v if np.ndim(v) == (k in vectors) else v[..., part] for k, v in self.parameters.items()}
-
-
-class Evaluation(NamedTuple):
-    """Energy, gradient (active,) and Hessian (active, active) of a state, and the size of the forces in it."""
-
-    energy: float
-    gradient: Array
-    matrix: sparse.csc_array
-    force: float
-
-
-class Worst(NamedTuple):
-    """The element that holds most of the greatest residual."""
-
-    term: str
-    element: int
-    energy: float
-    state: Array
 
 
 class System:
@@ -142,27 +91,7 @@ class System:
         self._forms: list[Form] = [form_of(t.kernel) if definite == "quick" else eigenvalues for t in self.terms]
         self._memory: dict[tuple[int, int], list[Array]] = {}
         self.seconds = {"kernels": 0.0, "assembly": 0.0}
-        self.nodes, self.coordinates = self._owners(np.asarray(Q, float), tables)
-
-    @staticmethod
-    def _heads(tables: Sequence[Elements], size: int) -> tuple[Array, Array]:
-        """The entry that stands for the node of each entry of a configuration, and which of them are points."""
-        head, point = np.arange(size), np.zeros(size, bool)
-        for table in tables:
-            at = dict(zip(table.labels, table.rows, strict=True))
-            for label, row in at.items():
-                name, _, axis = label.partition(".")
-                x = at.get(f"{name}.x" if axis else f"x{name[1:]}.x")
-                if x is not None:  # a sliding coordinate u1 lies at the point x1
-                    head[row] = x
-                    point[x] = True
-        return head, point
-
-    def _owners(self, Q: Array, tables: Sequence[Elements]) -> tuple[Array, Array | None]:
-        """The node of each unknown (active,), and coordinates of the nodes (nodes, 3) if all have some."""
-        head, point = self._heads(tables, self.size)
-        heads, nodes = np.unique(head[self.active], return_inverse=True)
-        return nodes, Q[heads[:, None] + np.arange(3)] if point[heads].all() else None
+        self.nodes, self.coordinates = owners(np.asarray(Q, float), self.active, tables)
 
     @property
     def count(self) -> int:

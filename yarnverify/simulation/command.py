@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from yarnverify.errors import InputError, NotRunError
-from yarnverify.simulation.problem import Problem
+from yarnverify.simulation.setting import Setting
 from yarnverify.simulation.runs import Reached
 from yarnverify.simulation.scene import SOLVERS, Scene, suggestion
 from yarnverify.simulation.study import Keeping, Study, Tell, study
@@ -180,7 +180,7 @@ class Files:
         except OSError as error:
             raise NotRunError(f"{self.folder} cannot be written: {error.strerror or error}") from None
 
-    def watch(self, problem: Problem, reached: Reached | None) -> None:
+    def watch(self, problem: Setting, reached: Reached | None) -> None:
         """Write a step of the series for ParaView: at the start, after each stage, and with each frame of a motion."""
         from yarnverify.simulation.view import Series
 

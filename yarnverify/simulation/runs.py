@@ -19,7 +19,7 @@ from yarnverify.simulation.assembly import System
 from yarnverify.simulation.dynamics import Dynamics, Motion
 from yarnverify.simulation.linear import Solver, SuperLU
 from yarnverify.simulation.newton import stages
-from yarnverify.simulation.problem import Moving, Outcome, Problem, Static
+from yarnverify.simulation.setting import Moving, Outcome, Setting, Static
 
 Array = NDArray[Any]
 State = Mapping[str, Any]
@@ -61,7 +61,7 @@ class Run:
         Called with a line on what goes on, now and then.
     """
 
-    problem: Problem
+    problem: Setting
     solver: str = "direct"
     report: Callable[[str], None] | None = None
     _dynamics: Dynamics | None = field(init=False, default=None)

@@ -14,7 +14,7 @@ from typing import Any
 
 from yarnverify.errors import InputError
 from yarnverify.kernels import ElementError
-from yarnverify.simulation.problem import Problem
+from yarnverify.simulation.setting import Setting
 from yarnverify.simulation.quantities import Quantity, Value, quantities_of
 
 SOLVERS = ("direct", "superlu")
@@ -53,7 +53,7 @@ class Scene:
         The parameter, one of some words, whose values are the lines of the diagram; the linear solvers if empty.
     """
 
-    build: Callable[..., Problem]
+    build: Callable[..., Setting]
     title: str
     size: str
     sizes: tuple[int, ...]
@@ -95,7 +95,7 @@ class Scene:
             name: q.checked(f"{self.name}: {name}", given.get(name, q.default)) for name, q in self.quantities.items()
         }
 
-    def problem(self, size: int, given: Mapping[str, Any] | None = None) -> Problem:
+    def problem(self, size: int, given: Mapping[str, Any] | None = None) -> Setting:
         """The problem of a size.
 
         Raises
@@ -127,10 +127,10 @@ class Scene:
 def scene(
     *, title: str, size: str, sizes: Sequence[int], source: str = "", wall: str = "", least: int = 1, compare: str = "",
     solvers: Sequence[str] = SOLVERS,
-) -> Callable[[Callable[..., Problem]], Scene]:  # fmt: skip
+) -> Callable[[Callable[..., Setting]], Scene]:  # fmt: skip
     """Declare a scene; see ``Scene`` for what is given."""
 
-    def declared(function: Callable[..., Problem]) -> Scene:
+    def declared(function: Callable[..., Setting]) -> Scene:
         quantities = quantities_of(function)
         if compare and (compare not in quantities or quantities[compare].kind != "choice"):
             raise InputError(

@@ -15,7 +15,7 @@ from typing import Any
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.kernels import ElementError
 from yarnverify.simulation.linear import LinearSolveError
-from yarnverify.simulation.problem import Problem
+from yarnverify.simulation.setting import Setting
 from yarnverify.simulation.runs import Reached, Run
 from yarnverify.simulation.scene import Line, Scene
 from yarnverify.simulation.search import NotConverged
@@ -39,7 +39,7 @@ class Study:
 
     result: dict[str, Any]
     timings: dict[str, Any]
-    problem: Problem
+    problem: Setting
     arrays: Mapping[str, Any]
 
     @property
@@ -67,7 +67,7 @@ class Keeping:
     folder: Path | None = None
     seconds: float = 10.0
     resume: bool = False
-    watch: Callable[[Problem, Reached | None], None] = lambda problem, reached: None
+    watch: Callable[[Setting, Reached | None], None] = lambda problem, reached: None
 
 
 def study(
