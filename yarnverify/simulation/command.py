@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from yarnverify.errors import InputError, NotRunError
-from yarnverify.simulation.setting import Setting
 from yarnverify.simulation.runs import Reached
 from yarnverify.simulation.scene import SOLVERS, Scene, suggestion
+from yarnverify.simulation.setting import Setting
 from yarnverify.simulation.study import Keeping, Study, Tell, study
 from yarnverify.simulation.view.files import whole
 

@@ -14,8 +14,8 @@ from typing import Any
 
 from yarnverify.errors import InputError
 from yarnverify.kernels import ElementError
-from yarnverify.simulation.setting import Setting
 from yarnverify.simulation.quantities import Quantity, Value, quantities_of
+from yarnverify.simulation.setting import Setting
 
 SOLVERS = ("direct", "superlu")
 

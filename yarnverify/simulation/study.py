@@ -15,10 +15,10 @@ from typing import Any
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.kernels import ElementError
 from yarnverify.simulation.linear import LinearSolveError
-from yarnverify.simulation.setting import Setting
 from yarnverify.simulation.runs import Reached, Run
 from yarnverify.simulation.scene import Line, Scene
 from yarnverify.simulation.search import NotConverged
+from yarnverify.simulation.setting import Setting
 from yarnverify.simulation.state import identity, load, save
 
 SLACK = 0.1  # how far an observed order may be from the expected one

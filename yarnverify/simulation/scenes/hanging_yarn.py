@@ -5,10 +5,10 @@ from yarnverify.kernels import gravity, stretch
 from yarnverify.simulation.answers import hanging_chain
 from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.fabric import segments, yarn
-from yarnverify.simulation.setting import Known, Stage, Static
 from yarnverify.simulation.quantities import positive, real
 from yarnverify.simulation.readings import tensions
 from yarnverify.simulation.scene import scene
+from yarnverify.simulation.setting import Known, Stage, Static
 
 
 @scene(
