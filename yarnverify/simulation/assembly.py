@@ -20,6 +20,7 @@ from scipy import sparse
 
 from yarnverify.kernels import ElementError
 from yarnverify.kernels.batch import Batch
+from yarnverify.kernels.inputs import check_options
 from yarnverify.simulation import scatter
 from yarnverify.simulation.owners import owners
 from yarnverify.simulation.pattern import Elements, Pattern, zeros
@@ -72,14 +73,15 @@ class System:
     ) -> None:
         self.size = np.size(Q)
         self.terms = tuple(terms)
-        self.active = np.unique(np.asarray(active, np.int64))
-        if self.active.size != np.size(active):
-            raise ValueError("an unknown is listed twice among the active ones")
-        if self.active.size and not (self.active[0] >= 0 and self.active[-1] < self.size):
-            raise ValueError(f"unknowns must be indices into a configuration of {self.size} entries")
+        self.active = _indices(active, self.size)
+        if definite not in ("quick", "eigenvalues"):
+            raise ValueError(f"definite must be 'quick' or 'eigenvalues', not {definite!r}")
+        check_options("raise", 1, engine)
         self.loads = np.zeros(self.size) if loads is None else np.array(loads, float)
         if self.loads.shape != (self.size,):
             raise ValueError(f"loads must have shape ({self.size},), not {self.loads.shape}")
+        if not np.isfinite(self.loads).all():
+            raise ValueError(f"loads must be finite, but load {np.flatnonzero(~np.isfinite(self.loads))[0]} is not")
         for term in self.terms:
             rows = term.table.rows
             if rows.size and not (rows.min() >= 0 and rows.max() < self.size):
@@ -237,7 +239,8 @@ class System:
             found = Batch(term.kernel.KERNEL, wanted, q, term.some(part), out=out, engine=self.engine).results()
         except ElementError as error:
             at = error.elements + (part.start if isinstance(part, slice) else 0)
-            raise ElementError(f"{error} (of {term.name}, from element {at[0]} of the system)", at) from None
+            reason = str(error).partition(f"element {error.elements[0]}: ")[2]
+            raise ElementError(f"{term.name}: element {at[0]}: {reason}", at) from None
         finally:
             self.seconds["kernels"] += perf_counter() - start
         return found
@@ -246,3 +249,16 @@ class System:
         start = perf_counter()
         self._forms[number](q, term.some(part), packed, self.pattern.places[number].pairs.tolist())
         self.seconds["kernels"] += perf_counter() - start
+
+
+def _indices(active: ArrayLike, size: int) -> Array:
+    """The unknowns in order."""
+    given = np.asarray(active)
+    if given.size and given.dtype.kind not in "iu":
+        raise ValueError(f"unknowns are indices, whole numbers, not {given.dtype}")
+    found = np.unique(given.astype(np.int64))
+    if found.size != given.size:
+        raise ValueError("an unknown is listed twice among the active ones")
+    if found.size and not (found[0] >= 0 and found[-1] < size):
+        raise ValueError(f"unknowns must be indices into a configuration of {size} entries")
+    return found

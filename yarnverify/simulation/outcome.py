@@ -68,7 +68,7 @@ class NotConverged(ArithmeticError):
 
     def __init__(self, reason: str, Q: Array, history: list[Iteration], worst: Worst | None) -> None:
         residuals = ", ".join(f"{line.residual:.1e}" for line in history[-5:])
-        text = f"{reason}; last residuals {residuals} N"
+        text = f"{reason}; last residuals {residuals} N" if history else reason
         if worst is not None:
             text += f"; worst element: {worst.term} {worst.element}, energy {worst.energy:.3e} J, state {worst.state.tolist()}"
         super().__init__(text)
@@ -98,3 +98,11 @@ class Options:
     iterations: int = 300
     patience: int = 5
     stable: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("residual", "step"):
+            if not 0 <= getattr(self, name) < 1:
+                raise ValueError(f"{name} = {getattr(self, name)} must be between 0 and 1: it is a relative size")
+        for name in ("iterations", "patience"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} = {getattr(self, name)} must be at least 1")

@@ -139,7 +139,12 @@ class Search:
 
     def _evaluate(self) -> Evaluation:
         known, self._next = self._next, None
-        value = self.steps.evaluate(self.Q) if known is None else known
+        try:
+            value = self.steps.evaluate(self.Q) if known is None else known
+        except ElementError as error:
+            if not self.history:
+                raise
+            raise NotConverged(f"the search led to where {error}", self._lowest, self.history, None) from error
         if not np.isfinite(value.gradient).all():
             raise NotConverged("the gradient is not finite", self._lowest, self.history, None)
         return value

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from yarnverify.kernels.inputs import parameters_of
 from yarnverify.simulation.tables import Table
 
 
@@ -25,6 +26,11 @@ class Term:
         Values of the kernel's parameters that the table does not know, each a number or (n,).
     name
         The kernel's, unless given.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A parameter is missing, not known, or not what the kernel takes.
     """
 
     kernel: Any
@@ -40,7 +46,12 @@ class Term:
         if missing or unknown:
             wrong = ", ".join(sorted(missing or unknown))
             raise ValueError(f"{self.name}: {'needs' if missing else 'has no'} parameter {wrong}")
-        object.__setattr__(self, "parameters", {k: np.asarray(values[k], float) for k in self.kernel.PARAMETERS})
+        given = {name: np.asarray(values[name]) for name in self.kernel.PARAMETERS}
+        try:
+            parameters_of(self.kernel.KERNEL, given, self.table.count, float)
+        except (TypeError, ValueError) as error:
+            raise type(error)(str(error).replace(self.kernel.KERNEL.name, self.name, 1)) from None
+        object.__setattr__(self, "parameters", {name: value.astype(float) for name, value in given.items()})
 
     def some(self, part: Any) -> dict[str, Any]:
         """Parameters of some elements."""
