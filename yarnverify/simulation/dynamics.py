@@ -126,7 +126,8 @@ class Dynamics:
         self.inertia = Inertia(self.system, kinetic)
         self.scheme, self.held = scheme, held
         self.options = {"residual": 1e-13, "stable": False, "iterations": 100, **options}
-        self._symmetric, self._general = solver, solver
+        self.solver = solver
+        self._own: dict[str, Solver] = {}
         self._fixed = np.ones(self.system.size, bool)
         self._fixed[self.system.active] = False
 
@@ -236,12 +237,15 @@ class Dynamics:
 
     def _solve(self, problem: Increment, start: Array, motion: Motion) -> Array:
         if self.inertia.bind(start, motion.Q, motion.Q_before):
-            if self._symmetric is None:
-                self._symmetric = solver_for(problem, self.inertia.active_mass)
-            return minimise(problem, start, self._symmetric, **self.options).Q
-        if self._general is None:
-            self._general = SuperLU(problem.nodes, problem.coordinates)
-        return problem.solve(start, self._general)
+            return minimise(problem, start, self.solver or self._symmetric(problem), **self.options).Q
+        if "any" not in self._own:
+            self._own["any"] = SuperLU(problem.nodes, problem.coordinates)
+        return problem.solve(start, self.solver or self._own["any"])
+
+    def _symmetric(self, problem: Increment) -> Solver:
+        if "symmetric" not in self._own:
+            self._own["symmetric"] = solver_for(problem, self.inertia.active_mass)
+        return self._own["symmetric"]
 
     def _adapted(self, motion: Motion, h: float, wanted: float, tolerance: float) -> Motion:
         """A step of at most h whose estimated error is within the tolerance; what it returns was made in two halves."""
