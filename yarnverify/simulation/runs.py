@@ -8,7 +8,7 @@ run.outcome(arrays)               what answers are read from
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -157,7 +157,7 @@ class Run:
         records = _Records(self._names, state)
         if not state:
             records.add(self._watched(0.0, motion.Q, motion))
-        for after in self._steps(motion):
+        for after in dynamics.run(motion, p.until, p.h, p.tolerance):
             frame = int(after.time / p.until * p.frames + 1e-9) > int(motion.time / p.until * p.frames + 1e-9)
             if frame:
                 frames.append(after.Q)
@@ -165,19 +165,6 @@ class Run:
             motion = after
             records.add(self._watched(motion.time, motion.Q, motion))
             yield Reached(motion.time, motion.Q, partial(_moving, motion, records, frames, times), frame)
-
-    def _steps(self, motion: Motion) -> Iterator[Motion]:
-        p, dynamics = self.problem, self._dynamics
-        assert isinstance(p, Moving) and dynamics is not None
-        if p.tolerance is not None:
-            yield from dynamics.run(motion, p.until, p.h, p.tolerance)
-            return
-        count = round(p.until / p.h)
-        for number in range(
-            motion.steps, count
-        ):  # times from their number, so that they do not depend on where a run began
-            motion = replace(dynamics.step(motion, p.h), time=p.until if number + 1 == count else (number + 1) * p.h)
-            yield motion
 
 
 class _Records:
