@@ -17,8 +17,8 @@ def bias_net(delta: float, *, across: int, along: int, L: float) -> Numbers:
     Crossings (i, j) lie at ``|i - j| <= across``, ``0 <= i + j <= 2 along``; the first and the last row are held. Where
     yarns do not stretch, a yarn keeps its direction across a gap between two yarns of the other family, so that a shape is
     told by one angle for each gap, the same for warp and weft: that of gap ``across/2 + k`` is alpha_k, and the gaps at both
-    ends are held by the grips. Equilibrium is least shear energy, half the sum of ``(alpha_i + alpha_j)^2`` over all quadrants, under
-    ``2 L sum cos(pi/4 - alpha_k) = sqrt(2) L (along - across) + delta``.
+    ends are held by the grips. Equilibrium is least shear energy, half the sum of ``(alpha_i + alpha_j)^2`` over all quadrants,
+    under ``2 L sum cos(pi/4 - alpha_k) = sqrt(2) L (along - across) + delta``.
 
     For ``along = 2 across`` all alpha are equal, and the shear angles are those of ``bias_extension``; a longer cloth shears
     more towards its grips, and only the mean is nearly the same.
