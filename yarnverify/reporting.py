@@ -10,7 +10,7 @@ from typing import Any
 
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.generation import Outcome, generate_kernels, settle_files
-from yarnverify.library import MAIN_DOCUMENT, derivations
+from yarnverify.library import MAIN_DOCUMENT, declared_files, derivations, known
 from yarnverify.show import mistake_lines, tally_lines
 from yarnverify.verdicts import verdicts
 
@@ -59,11 +59,19 @@ def build_report(
     texts |= pages({name: json.loads(texts[f"records/{name}.json"]) for name in records} | measured, drawn)
     there = {path.relative_to(out).as_posix() for pattern in ("*.md", "records/*.json") for path in out.glob(pattern)}
     there -= {f"records/{name}.json" for name in MEASURED}
+    if not check:  # made from the same records at any time, and so not kept under version control
+        texts["report.html"] = _page(records | measured, out / "pictures")
     outcome = settle_files(out, texts, check, sorted(there - set(texts)), "yarnverify report")
     outcome.lines = [*lines, *outcome.lines]
     outcome.differs |= not expected
     outcome.record = {"tally": records["verdicts"]["tally"], "as_expected": expected, "files": sorted(texts)}
     return outcome
+
+
+def _page(records: dict[str, Any], folder: Path) -> str:
+    from yarnverify.report.html import page
+
+    return page(records, {path.stem: path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.svg"))})
 
 
 def _draw(folder: Path, measured: dict[str, Any], energies: list[str], lines: list[str]) -> None:
@@ -112,7 +120,11 @@ def _records(advance: Callable[[str, int], None]) -> tuple[dict[str, Any], list[
     energies.sort(key=lambda energy: order.index(energy.section) if energy.section in order else len(order))
     derived = {}
     for energy in energies:
-        derived[energy.name] = {"section": energy.section, **explain_energy(energy, declarations)}
+        explained, _ = known(
+            [b"derivation", energy.name.encode(), *declared_files(derivations())],
+            partial(explain_energy, energy, declarations),
+        )
+        derived[energy.name] = {"section": energy.section, **explained}
         advance(f"explaining {energy.name}", len(energies))
     lines = [*mistake_lines(found), *tally_lines(found), f"{took}."]
     if kernels.differs:
