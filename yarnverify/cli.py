@@ -368,6 +368,7 @@ def check(
     if not _json(record(found), json_file):
         show(found)
     if not found.passes:
+        sys.exit(1)
 
 
 @app.command
