@@ -72,7 +72,7 @@ class NotConverged(ArithmeticError):
         if worst is not None:
             text += f"; worst element: {worst.term} {worst.element}, energy {worst.energy:.3e} J, state {worst.state.tolist()}"
         super().__init__(text)
-        self.Q, self.history, self.worst = Q, history, worst
+        self.reason, self.Q, self.history, self.worst = reason, Q, history, worst
 
 
 @dataclass(frozen=True)
