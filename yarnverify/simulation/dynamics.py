@@ -125,7 +125,7 @@ class Dynamics:
         self.system = System(Q, terms, active, loads, others=[elements_of(kinetic)], engine=engine)
         self.inertia = Inertia(self.system, kinetic)
         self.scheme, self.held = scheme, held
-        self.options = {"residual": 1e-13, "stable": False, "iterations": 100, **options}
+        self.options = {"residual": 1e-13, "step": 1e-16, "stable": False, "iterations": 100, **options}
         self.solver = solver
         self._own: dict[str, Solver] = {}
         self._fixed = np.ones(self.system.size, bool)
