@@ -60,7 +60,9 @@ def swinging_yarn(
         h=h,
         known=[
             Known("frequency of the chain", "Hz", chain, found, within=1e-9 + 4 * square),
-            Known("frequency", "Hz", exact, found, order=4, within=(kappa * length / (2 * size)) ** 4 / 80 + 4 * square),
+            Known(
+                "frequency", "Hz", exact, found, order=4, within=(kappa * length / (2 * size)) ** 4 / 80 + 4 * square
+            ),
         ],
         start=start,
         watch={"swing": lambda at: float(shape @ at.points[:, 2])},

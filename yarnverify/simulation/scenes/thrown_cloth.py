@@ -14,7 +14,7 @@ from yarnverify.simulation.setting import Array, Known, Moving, Outcome
 @scene(
     title="a small cloth thrown into the air, turning",
     size="steps",
-    sizes=(20, 40, 80),
+    sizes=(15, 30, 60),
     source="conservation: the momentum changes by the weight alone, the centre flies along a parabola, and the angular "
     "momentum about the centre stays; the midpoint rule has this to the last bit, the others at their order",
     wall="nowhere: all positions are free",
@@ -48,7 +48,8 @@ def thrown_cloth(
     share = np.bincount(ends.ravel(), minlength=cloth.nodes) / ends.size  # half a segment at each of its ends
     away = cloth.points(cloth.Q) - share @ cloth.points(cloth.Q)
     V = 0 * cloth.Q
-    cloth.points(V)[:] = [0, 0, speed] + np.cross(spin * np.array([3, 1, 1]) / np.sqrt(11), away)
+    cloth.points(V)[:] = np.cross(spin * np.array([3, 1, 1]) / np.sqrt(11), away)
+    cloth.points(V)[:, 2] += speed
     cloth.points(V)[:, 2] += flutter * away[:, 0] * away[:, 1] / np.abs(away).max()
     mass = Term(kinetic, segments(cloth, kinetic), {"rho": rho})
     total = rho * L * table.count
@@ -71,6 +72,4 @@ def thrown_cloth(
               scale=abs(speed) * until + g * until**2 / 2),
         Known("angular momentum", "kg m^2/s", turning, angular, order, within),
     ]  # fmt: skip
-    return Moving(
-        cloth, terms, cloth.positions(), mass, until, until / size, known, scheme, V=V, colour="bending"
-    )
+    return Moving(cloth, terms, cloth.positions(), mass, until, until / size, known, scheme, V=V, colour="bending")
