@@ -43,6 +43,14 @@ Json = Annotated[
 ]
 
 
+Junit = Annotated[Path | None, Parameter(help="Write the verdicts as JUnit XML here.")]
+Summary = Annotated[Path | None, Parameter(help="Write a short summary here, as Markdown.")]
+Annotations = Annotated[
+    bool,
+    Parameter(negative="", help="Also print workflow commands of GitHub Actions, which mark lines of the document."),
+]
+
+
 def _stop(message: str, status: int = 2) -> NoReturn:
     print(message, file=sys.stderr)
     sys.exit(status)
@@ -128,6 +136,9 @@ def prove(
     *,
     derivations: Derivations = None,
     json_file: Json = None,
+    junit: Junit = None,
+    summary: Summary = None,
+    annotations: Annotations = False,
     cache: Annotated[bool, Parameter(help="Use and keep results that are already known.")] = True,
 ) -> None:
     """A verdict on every printed equation.
@@ -137,13 +148,25 @@ def prove(
     document
         Markdown or text with numbered formulas; the paper's document by default.
     """
+    from yarnverify import ci
+    from yarnverify.errors import InputError
     from yarnverify.show import show_verdicts
-    from yarnverify.verdicts import verdicts
+    from yarnverify.verdicts import path_of, verdicts
 
-    with progress("proving") as advance:
-        record, took = verdicts(document, derivations, cache, advance)
-    if not _json(record, json_file):
+    try:
+        with progress("proving") as advance:
+            record, took = verdicts(document, derivations, cache, advance)
+    except InputError as error:
+        if annotations and error.place:
+            print(ci.annotation("error", *error.place, "yarnverify", error.message), file=sys.stderr)
+        raise
+    path = ci.shown_path(path_of(document))
+    ci.write(record, path, junit, summary)
+    quiet = _json(record, json_file)
+    if not quiet:
         show_verdicts(record, took)
+    if annotations:
+        print(*ci.workflow_commands(record, path), sep="\n", file=sys.stderr if quiet else sys.stdout)
     if not record["as_expected"]:
         sys.exit(1)
 
