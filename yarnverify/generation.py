@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from yarnverify.library import MAIN_DOCUMENT, derivations
+from yarnverify.project import Project, project
 
 DEFAULT_VARIANT = "accurate"
 WRITTEN_BY_HAND = {
@@ -76,8 +76,10 @@ def settle_files(folder: Path, texts: dict[str, str], check: bool, stale: list[s
     return outcome
 
 
-def generate_kernels(check: bool, advance: Callable[[str, int], None] = lambda label, total: None) -> Outcome:
-    """Generate every variant of every declared energy of the main document.
+def generate_kernels(
+    check: bool, advance: Callable[[str, int], None] = lambda label, total: None, of: Project | None = None
+) -> Outcome:
+    """Generate every variant of every energy of a project; of the package's own derivations by default.
 
     Raises
     ------
@@ -86,9 +88,17 @@ def generate_kernels(check: bool, advance: Callable[[str, int], None] = lambda l
     """
     from yarnverify.symbolic.modules import kernel_modules
 
-    folder = Path(__file__).parent / "kernels"
-    texts, record = kernel_modules(derivations(), MAIN_DOCUMENT, DEFAULT_VARIANT, advance)
-    there = {path.relative_to(folder).as_posix() for path in folder.rglob("*.py")}
-    outcome = settle_files(folder, texts, check, sorted(there - set(texts) - WRITTEN_BY_HAND), "yarnverify generate")
-    outcome.record = record
+    of = of or project()
+    made = kernel_modules(of.folder, of.document, DEFAULT_VARIANT, advance, of.package)
+    there = {path.relative_to(of.kernels).as_posix() for path in of.kernels.rglob("*.py")}
+    by_hand = set() if of.own else WRITTEN_BY_HAND
+    stale = sorted(name for name in there - set(made.texts) - by_hand if _is_generated(of.kernels / name))
+    outcome = settle_files(of.kernels, made.texts, check, stale, of.command("yarnverify generate"))
+    outcome.record = made.operations
+    outcome.lines += made.notes
     return outcome
+
+
+def _is_generated(path: Path) -> bool:
+    """Whether a file says that it may be removed when nothing belongs to it any more."""
+    return "Generated" in path.read_text(encoding="utf-8", errors="replace")[:2000]
