@@ -201,7 +201,9 @@ def small(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     monkeypatch.setattr(
         command,
         "plan",
-        lambda profile, energies, variants, folder: plan(profile, energies or ["stretch", "parallel_contact"], variants),
+        lambda profile, energies, variants, folder: plan(
+            profile, energies or ["stretch", "parallel_contact"], variants
+        ),
     )
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     # targets are judged on the real profile, by `yarnverify accuracy --check`; here the commands are

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from yarnverify.library import declared_files, known
 from yarnverify.project import Project, project
 
 DEFAULT_VARIANT = "accurate"
@@ -77,25 +78,48 @@ def settle_files(folder: Path, texts: dict[str, str], check: bool, stale: list[s
 
 
 def generate_kernels(
-    check: bool, advance: Callable[[str, int], None] = lambda label, total: None, of: Project | None = None
+    check: bool,
+    advance: Callable[[str, int], None] = lambda label, total: None,
+    cache: bool = True,
+    of: Project | None = None,
 ) -> Outcome:
-    """Generate every variant of every energy of a project; of the package's own derivations by default.
+    """Generate every variant of every energy of a project.
+
+    Parameters
+    ----------
+    check
+        Compare instead of writing.
+    advance
+        Called as each module is made.
+    cache
+        Whether what the same derivations gave in an earlier run is used and kept.
+    of
+        The project; that of the package by default.
 
     Raises
     ------
     InputError, NotRunError
         For derivations that cannot be read or proved, and files that cannot be written.
     """
-    from yarnverify.symbolic.modules import kernel_modules
 
-    of = of or project()
-    made = kernel_modules(of.folder, of.document, DEFAULT_VARIANT, advance, of.package)
-    there = {path.relative_to(of.kernels).as_posix() for path in of.kernels.rglob("*.py")}
-    by_hand = set() if of.own else WRITTEN_BY_HAND
-    stale = sorted(name for name in there - set(made.texts) - by_hand if _is_generated(of.kernels / name))
-    outcome = settle_files(of.kernels, made.texts, check, stale, of.command("yarnverify generate"))
-    outcome.record = made.operations
-    outcome.lines += made.notes
+    place = of or project()
+
+    def make() -> dict[str, Any]:
+        from yarnverify.symbolic.modules import kernel_modules
+
+        return asdict(kernel_modules(place.folder, place.document, DEFAULT_VARIANT, advance, place.package))
+
+    what = [b"kernels", DEFAULT_VARIANT.encode(), place.package.encode(), place.document.encode()]
+    made, _ = known([*what, *declared_files(place.folder)], make, cache)
+    texts = made["texts"]
+    there = {path.relative_to(place.kernels).as_posix() for path in place.kernels.rglob("*.py")}
+    by_hand = set() if place.own else WRITTEN_BY_HAND
+    stale = sorted(
+        name for name in there - set(texts) - by_hand if not place.own or _is_generated(place.kernels / name)
+    )
+    outcome = settle_files(place.kernels, texts, check, stale, place.command("yarnverify generate"))
+    outcome.record = made["operations"]
+    outcome.lines += made["notes"]
     return outcome
 
 

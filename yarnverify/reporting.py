@@ -10,6 +10,7 @@ from typing import Any
 
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.generation import Outcome, generate_kernels, settle_files
+from yarnverify.library import declared_files, known
 from yarnverify.project import Project, project
 from yarnverify.show import mistake_lines, tally_lines
 from yarnverify.verdicts import nothing_printed, verdicts
@@ -124,6 +125,7 @@ def _sweep(of: Project, out: Path, advance: Callable[[str, int], None]) -> list[
 
 def _records(of: Project, check: bool, advance: Callable[[str, int], None]) -> tuple[dict[str, Any], list[str], bool]:
     """The records behind the pages, what to say of them, and whether all is as expected."""
+    from yarnverify.accuracy.regimes import not_drawn
     from yarnverify.symbolic.declare import load_declarations
     from yarnverify.symbolic.explain import explain_energy
 
@@ -132,13 +134,17 @@ def _records(of: Project, check: bool, advance: Callable[[str, int], None]) -> t
     found, took = nothing_printed(), "No document"
     if of.document:
         found, took = verdicts(of.folder / of.document, advance=advance)
-    kernels = generate_kernels(check or not of.own, advance, of)
+    kernels = generate_kernels(check or not of.own, advance, of=of)
     order = [part["section"] for part in found["completeness"]]
     energies.sort(key=lambda energy: order.index(energy.section) if energy.section in order else len(order))
     derived = {}
     for energy in energies:
         title = energy.section or energy.name.replace("_", " ").capitalize()
-        derived[energy.name] = {"section": energy.section, "title": title, **explain_energy(energy, declarations)}
+        explained, _ = known(
+            [b"derivation", energy.name.encode(), *declared_files(of.folder)],
+            partial(explain_energy, energy, declarations),
+        )
+        derived[energy.name] = {"section": energy.section, "title": title, "not_swept": not_drawn(energy), **explained}
         advance(f"explaining {energy.name}", len(energies))
     lines = (
         [*mistake_lines(found), *tally_lines(found), f"{took}."]

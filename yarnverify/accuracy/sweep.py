@@ -67,7 +67,7 @@ def plan(
     """
     where = "" if folder is None else str(folder)
     folder = folder or derivations()
-    names = [energy.name for energy in load_declarations(folder).energies]
+    names = [energy.name for energy in load_declarations(folder).energies if not not_drawn(energy)]
     for name in energies:
         declared_energy(name, folder)
     for variant in variants:

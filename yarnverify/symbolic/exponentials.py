@@ -1,7 +1,7 @@
-"""Natural logarithms and exponentials, for each kind of number; an exponential and a logarithm of what varies are transcendental.
+"""Natural logarithms and exponentials, for each kind of number; those of what varies are transcendental.
 
-Over rationals both are drawn next to their true values, as angles are: an identity of functions holds whatever they are. What is
-kept is ``log(a b) = log a + log b`` over the prime factors of rationals, ``exp(-a) = 1/exp(a)`` and ``exp(0) = 1``.
+Over rationals both are drawn next to their true values, as angles are: an identity of functions holds whatever they are.
+Kept are ``log(a b) = log a + log b`` over the prime factors of rationals, ``exp(-a) = 1/exp(a)`` and ``exp(0) = 1``.
 """
 
 from __future__ import annotations
