@@ -72,11 +72,19 @@ def build_report(
     )
     there = {path.relative_to(out).as_posix() for pattern in ("*.md", "records/*.json") for path in out.glob(pattern)}
     there -= {f"records/{name}.json" for name in MEASURED}
+    if not check:  # made from the same records at any time, and so not kept under version control
+        texts["report.html"] = _page(records | measured, out / "pictures", of.name)
     outcome = settle_files(out, texts, check, sorted(there - set(texts)), of.command("yarnverify report"))
     outcome.lines = [*lines, *outcome.lines]
     outcome.differs |= not expected
     outcome.record = {"tally": records["verdicts"]["tally"], "as_expected": expected, "files": sorted(texts)}
     return outcome
+
+
+def _page(records: dict[str, Any], folder: Path, name: str) -> str:
+    from yarnverify.report.html import page
+
+    return page(records, {path.stem: path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.svg"))}, name)
 
 
 def _draw(folder: Path, measured: dict[str, Any], energies: list[str], lines: list[str]) -> None:

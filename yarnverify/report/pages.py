@@ -8,7 +8,7 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from yarnverify.report.accuracy import accuracy_table
+from yarnverify.report.accuracy import accuracy_table, kinds
 from yarnverify.report.benchmark import benchmark_table
 
 _TEMPLATES = Environment(
@@ -45,7 +45,7 @@ def pages(
             found=found,
             derived=derived,
             rows=_rows(found, ""),
-            mistakes=_mistakes(found, None),
+            mistakes=mistakes(found, None),
             place=place,
         )
     }
@@ -58,7 +58,7 @@ def pages(
             found=found,
             derivation=derivation,
             rows=_rows(found, section),
-            mistakes=_mistakes(found, section) if section else [],
+            mistakes=mistakes(found, section) if section else [],
             completeness=next((part for part in found["completeness"] if part["section"] == section), None),
             kernels=records["kernels"].get(energy, {}),
             accuracy=_accuracy(records.get("accuracy"), energy),
@@ -73,8 +73,7 @@ def _accuracy(record: dict[str, Any] | None, energy: str) -> list[str]:
     """The tables of an energy; empty where the sweep was not run."""
     if record is None:
         return []
-    kinds = sorted({cell["dtype"] for cell in record["cells"] if cell["energy"] == energy}, reverse=True)
-    return [accuracy_table(record, energy, kind) for kind in kinds]
+    return [accuracy_table(record, energy, kind) for kind in kinds(record, energy)]
 
 
 def _benchmark(record: dict[str, Any] | None, energy: str) -> str:
@@ -97,7 +96,7 @@ def _rows(found: dict[str, Any], section: str) -> list[dict[str, Any]]:
     return list(rows.values())
 
 
-def _mistakes(found: dict[str, Any], section: str | None) -> list[dict[str, Any]]:
+def mistakes(found: dict[str, Any], section: str | None) -> list[dict[str, Any]]:
     """What is not proved, in a section or anywhere: one entry for each equation and reason."""
     groups: dict[tuple[str, str], dict[str, Any]] = {}
     for claim in found["claims"]:
