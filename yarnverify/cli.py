@@ -1,4 +1,4 @@
-"""The command line: ``yarnverify prove | derive | generate | accuracy | benchmark | fuzz | simulate |
+"""The command line: ``yarnverify prove | derive | generate | check | accuracy | benchmark | fuzz | simulate |
 report``.
 
 Exit status: 0 all as expected; 1 a check failed, or an erratum is new or stale; 2 bad usage or input; 3 asked for but
@@ -40,6 +40,14 @@ Json = Annotated[
     Parameter(
         name="--json", allow_leading_hyphen=True, help="Write the data behind the output here; - for standard output."
     ),
+]
+
+
+Junit = Annotated[Path | None, Parameter(help="Write the verdicts as JUnit XML here.")]
+Summary = Annotated[Path | None, Parameter(help="Write a short summary here, as Markdown.")]
+Annotations = Annotated[
+    bool,
+    Parameter(negative="", help="Also print workflow commands of GitHub Actions, which mark lines of the document."),
 ]
 
 
@@ -128,6 +136,9 @@ def prove(
     *,
     derivations: Derivations = None,
     json_file: Json = None,
+    junit: Junit = None,
+    summary: Summary = None,
+    annotations: Annotations = False,
     cache: Annotated[bool, Parameter(help="Use and keep results that are already known.")] = True,
 ) -> None:
     """A verdict on every printed equation.
@@ -137,15 +148,27 @@ def prove(
     document
         Markdown or text with numbered formulas, or a folder that holds it; the paper's document by default.
     """
+    from yarnverify import ci
+    from yarnverify.errors import InputError
     from yarnverify.project import document_of
     from yarnverify.show import show_verdicts
-    from yarnverify.verdicts import verdicts
+    from yarnverify.verdicts import path_of, verdicts
 
     document = document_of(document)
-    with progress("proving") as advance:
-        record, took = verdicts(document, derivations, cache, advance)
-    if not _json(record, json_file):
+    try:
+        with progress("proving") as advance:
+            record, took = verdicts(document, derivations, cache, advance)
+    except InputError as error:
+        if annotations and error.place:
+            print(ci.annotation("error", *error.place, "yarnverify", error.message), file=sys.stderr)
+        raise
+    path = ci.shown_path(path_of(document))
+    ci.write(record, path, junit, summary)
+    quiet = _json(record, json_file)
+    if not quiet:
         show_verdicts(record, took)
+    if annotations:
+        print(*ci.workflow_commands(record, path), sep="\n", file=sys.stderr if quiet else sys.stdout)
     if not record["as_expected"]:
         sys.exit(1)
 
@@ -320,6 +343,88 @@ def report(
     with progress("reporting") as advance:
         outcome = build_report(out, check, advance, pictures, project(folder))
     _finish(outcome, json_file)
+
+
+@app.command
+def check(
+    target: str | None = None,
+    /,
+    *,
+    energy: Annotated[str | None, Parameter(help="Which energy; found in the target's name by default.")] = None,
+    order: Annotated[
+        str | None,
+        Parameter(
+            help="Order of your unknowns: x0,x1,x2,u1,u2. A name that the energy lacks gets 0; _ is passed over."
+        ),
+    ] = None,
+    returns: Annotated[
+        list[str] | None,
+        Parameter(
+            help="What comes back, in order: energy, gradient or force, hessian or jacobian, blocks such as x1 or x1,u1.",
+            consume_multiple=True,
+            negative="",
+        ),
+    ] = None,
+    force: Annotated[bool, Parameter(negative="", help="Your gradients are forces.")] = False,
+    jacobian: Annotated[bool, Parameter(negative="", help="Your Hessians are Jacobians of forces.")] = False,
+    layout: Annotated[
+        Literal["auto", "single", "component", "element"],
+        Parameter(
+            help="One state a call, arrays (rows, states), or arrays (states, rows); tried in this order by default."
+        ),
+    ] = "auto",
+    column_major: Annotated[bool, Parameter(negative="", help="Your matrices are stored column by column.")] = False,
+    float32: Annotated[bool, Parameter(negative="", help="Hold it to single precision.")] = False,
+    with_: Annotated[
+        tuple[str, ...],
+        Parameter(name="--with", help="What an argument of yours is: kb=k_b, R=d/4, du=u1-u0.", negative=""),
+    ] = (),
+    fix: Annotated[
+        tuple[str, ...], Parameter(help="A parameter that your code has built in: k_b=1.", negative="")
+    ] = (),
+    command: Annotated[
+        str | None,
+        Parameter(help="Instead of a target, a command line: './mine {in} {out}'.", allow_leading_hyphen=True),
+    ] = None,
+    files: Annotated[Literal["json", "npz", "csv"], Parameter(help="What the command reads and writes.")] = "json",
+    write_inputs: Annotated[Path | None, Parameter(help="Only write the states: a .json, .npz or .csv file.")] = None,
+    outputs: Annotated[Path | None, Parameter(help="Instead of a target, results for the states so written.")] = None,
+    count: Annotated[int, Parameter(help="States of each regime.")] = 16,
+    regime: Annotated[
+        tuple[str, ...], Parameter(help="Only these hard cases, such as 'small angle'.", negative="")
+    ] = (),
+    extreme: Annotated[
+        bool, Parameter(negative="", help="Sizes from 1e-200 to 1e200 too, which no cloth has.")
+    ] = False,
+    time_limit: Annotated[float, Parameter(help="Seconds that a call may take.")] = 10.0,
+    derivations: Annotated[Path | None, Parameter(help="Folder of declared energies.")] = None,
+    json_file: Json = None,
+) -> None:
+    """Your own implementation against the truth, over the hard cases, block by block.
+
+    Parameters
+    ----------
+    target
+        module:function, file.py:function, a module or file with functions energy, gradient or force, hessian or jacobian;
+        or library.so:function with the C interface that README.md describes.
+    """
+    from yarnverify.check.command import Options, write_states
+    from yarnverify.check.command import check as checked
+    from yarnverify.check.show import record, show
+
+    options = Options(
+        energy, order, tuple(returns or ()), force, jacobian, layout, column_major, float32, with_, fix, count, regime,
+        extreme, time_limit, derivations,
+    )  # fmt: skip
+    if write_inputs is not None:
+        print(write_states(write_inputs, options))
+        return
+    with progress("checking") as advance:
+        found = checked(target, options, command, outputs, files, advance)
+    if not _json(record(found), json_file):
+        show(found)
+    if not found.passes:
+        sys.exit(1)
 
 
 @app.command

@@ -19,6 +19,11 @@ from yarnverify.library import (
 from yarnverify.source import load
 
 
+def path_of(document: Path | None) -> Path:
+    """The path of a document; the main one's for None."""
+    return document if document is not None else derivations() / MAIN_DOCUMENT
+
+
 def verdicts(
     document: Path | None = None,
     choice: str | None = None,
@@ -44,7 +49,7 @@ def verdicts(
         For a document, declarations or errata that cannot be read.
     """
     start = time.perf_counter()
-    path = document if document is not None else derivations() / MAIN_DOCUMENT
+    path = path_of(document)
     source = load(path)
     shelf = shelf_for(path, source.text, choice)
     parts: list[bytes | Path] = [

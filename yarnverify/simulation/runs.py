@@ -23,6 +23,7 @@ from yarnverify.simulation.setting import Moving, Outcome, Setting, Static
 
 Array = NDArray[Any]
 State = Mapping[str, Any]
+RESIDUAL = 1e-15  # of the greatest force: to rounding, so that exact answers come out to their last digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,18 +122,22 @@ class Run:
         assert isinstance(p, Static)
         done, iterations = (int(state["stage"]), int(state["iterations"])) if state else (0, 0)
         Q = np.array(state["Q"], float) if state else self.start
+        before = np.array(state["Q before"], float) if state else self.start
         records = _Records(self._names, state)
         solver = self._linear(None)
+        options = {"residual": RESIDUAL, **p.options}
         for stage in p.stages[:done]:  # loads that a stage leaves are those of the one before
             self.system.loads = self.system.loads if stage.loads is None else np.array(stage.loads, float)
         for number, stage in list(enumerate(p.stages))[done:]:
+            guess = Q.copy()
+            guess[self.system.active] += (Q - before)[self.system.active]  # as the stage before went
             for found in stages(
-                self.system, Q, [stage.loads], [stage.held], solver, report=self._tell(number), **p.options
+                self.system, guess, [stage.loads], [stage.held], solver, report=self._tell(number), **options
             ):
-                Q, iterations = found.Q, iterations + found.iterations
+                before, Q, iterations = Q, found.Q, iterations + found.iterations
             records.add(self._watched(number + 1.0, Q, None))
-            counts = {"stage": number + 1, "iterations": iterations}
-            yield Reached(number + 1.0, Q, partial(_together, {"Q": Q, **counts}, records))
+            own = {"Q": Q, "Q before": before, "stage": number + 1, "iterations": iterations}
+            yield Reached(number + 1.0, Q, partial(_together, own, records))
 
     def _tell(self, number: int) -> Callable[[Any], None] | None:
         if self.report is None:

@@ -188,6 +188,17 @@ class Moving:
 Setting = Static | Moving
 
 
+def rounding(condition: float) -> float:
+    """Error that is allowed for an exact answer: 1e-12, or eight units of rounding where these make more of it.
+
+    Parameters
+    ----------
+    condition
+        Relative change of the answer for a relative change of the coordinates, of their extent.
+    """
+    return max(1e-12, 8 * float(np.finfo(float).eps) * condition)
+
+
 def ramp(loads: Array, stages: int) -> tuple[Stage, ...]:
     """Loads that grow to their size in equal stages."""
     return tuple(Stage(loads=loads * (k / stages)) for k in range(1, stages + 1))
