@@ -82,6 +82,14 @@ class Increment:
         size = float(np.abs(self.momentum[self.active]).max(initial=0.0)) / self.tau
         return Evaluation(energy + work, self.a * gradient + slope[self.active], matrix, max(self.a * force, size))
 
+    def lacking(self, gradient: Array, step: Array) -> Array:
+        """Momentum (active,) by which the end of a step differs where a step of less than rounding is still to be made.
+
+        With the residual r and the step d, K the stiffness: force and inertia balance at ``F - a K d``, and
+        ``(a a K + M/tau^2) d = -r``.
+        """
+        return (gradient + self.inertia.active_mass @ step / self.tau**2) * self.tau / self.a
+
     def worst(self, Q: Array) -> Worst | None:
         """The element of the greatest residual."""
         return self.inertia.system.worst(self.at(Q))
