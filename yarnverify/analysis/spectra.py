@@ -131,7 +131,7 @@ def at_rest(family: Family) -> list[tuple[float, int]]:
     A contact that is pressed stands for one at rest, where its second derivative jumps.
     """
     angle, length = (np.array([value]) for value in family.rest)
-    values = spectrum(family.kernel, family.state(angle, length), **family.parameters)[:, 0]
+    values = spectrum(family.kernel, family.state(angle, length), True, **family.parameters)[:, 0]
     scale = float(np.abs(values).max())
     found: list[tuple[float, int]] = []
     for value in sorted(values[np.abs(values) > NOISE * scale], reverse=True):
@@ -150,8 +150,8 @@ class Map:
     Attributes
     ----------
     held, free
-        Lowest eigenvalue over the largest, zero where none is negative, (stretches, angles): with sliding coordinates held,
-        and with all unknowns free. None for an energy that is left without unknowns.
+        Lowest eigenvalue over the largest in size, zero where none is negative, (stretches, angles): with sliding
+        coordinates held, and with all unknowns free. None for an energy that is left without unknowns.
     counts
         All numbers of negative eigenvalues that occur, with all unknowns free.
     """
@@ -168,10 +168,10 @@ def sign_map(family: Family) -> Map:
         part.ravel() for part in np.meshgrid(family.stretch[1], np.radians(family.angle[1]), indexing="ij")
     )
     q = family.state(angle, length)
-    free = spectrum(family.kernel, q, **family.parameters)
+    free = spectrum(family.kernel, q, True, **family.parameters)
     held = None
     if not family.sliding.all():
-        held = _lowest(spectrum(family.kernel, q, sliding=False, **family.parameters)).reshape(shape)
+        held = _lowest(spectrum(family.kernel, q, False, **family.parameters)).reshape(shape)
     counts = tuple(int(count) for count in np.unique(negative(free)))
     return Map(held, _lowest(free).reshape(shape), counts)
 

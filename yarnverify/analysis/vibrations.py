@@ -21,6 +21,7 @@ from yarnverify.simulation.inertia import Inertia, elements_of
 from yarnverify.simulation.linear import LinearSolveError, Multifrontal
 
 Array = NDArray[Any]
+_ORDERS = ((1, 1), (1, 2), (2, 1), (2, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +65,9 @@ def modes(fabric: Fabric, terms: Sequence[Term], active: ArrayLike, rho: float, 
     at = fabric.Q if Q is None else Q
     moving = np.asarray(active)[np.asarray(active) < 3 * fabric.nodes]
     if not 0 < count < moving.size:
-        raise InputError(f"there are {moving.size} positions that move: ask for 1 to {moving.size - 1} modes, not {count}")
+        raise InputError(
+            f"there are {moving.size} positions that move: ask for 1 to {moving.size - 1} modes, not {count}"
+        )
     term = Term(kinetic, segments(fabric, kinetic), {"rho": rho})
     system = System(at, terms, moving, others=[elements_of(term)])
     inertia = Inertia(system, term)
@@ -125,7 +128,7 @@ def pinned_yarn(size: int, count: int = 4, *, k_s: float, k_b: float, rho: float
 
 
 def tight_net(size: int, *, k_s: float, rho: float, L: float = 1e-3, R: float = 0.2e-3, strain: float = 0.01,
-              orders: Sequence[tuple[int, int]] = ((1, 1), (1, 2), (2, 1), (2, 2))) -> tuple[Compared, Fabric, Modes]:  # fmt: skip
+              orders: Sequence[tuple[int, int]] = _ORDERS) -> tuple[Compared, Fabric, Modes]:  # fmt: skip
     """A square net, stretched and held at its border, that swings out of its plane like a membrane.
 
     With w_m = 4 sin^2(m pi/(2 n)) for n cells each way, strain e and tension T = k_s e, a mode (m, k) has

@@ -60,7 +60,9 @@ def _rest(record: dict[str, Any]) -> Table:
         share = f"{100 * own['indefinite']:.3g} %"
         rows.append((name, values, own["unit"], ", ".join(map(str, own["negative"])), share))
     headings = ("energy", "eigenvalues at rest", "unit", "negative ones on the map", "indefinite on the map")
-    note = "Of one element, with all unknowns free; h is the rest length of a segment. Contact is taken where it sets in."
+    note = (
+        "Of one element, with all unknowns free; h is the rest length of a segment. Contact is taken where it sets in."
+    )
     return Table("Hessian of each energy", headings, tuple(rows), (note,))
 
 
@@ -91,11 +93,20 @@ def _vibrations(record: dict[str, Any]) -> list[Table]:
         f"Modes of a yarn of {yarn['length']:g} m with pinned ends, Hz, beside f_n = {known}",
         f"Modes of a net {net['side']:g} m wide, stretched by {100 * net['strain']:g} %, Hz, beside those of a membrane",
     )
-    return [_modes(own, title) for own, title in zip((yarn, net), titles, strict=True)]
+    notes = (
+        "With the mass of the declared kinetic energy, errors of stiffness and of mass cancel at second order.",
+        "Here both errors have the same sign.",
+    )
+    return [_modes(own, *texts) for own, *texts in zip((yarn, net), titles, notes, strict=True)]
 
 
-def _modes(own: dict[str, Any], title: str) -> Table:
-    headings = ("segments", *(f"mode {k + 1}" for k in range(len(own["limit"]))), "greatest error", "as the discrete answer")
+def _modes(own: dict[str, Any], title: str, note: str) -> Table:
+    headings = (
+        "segments",
+        *(f"mode {k + 1}" for k in range(len(own["limit"]))),
+        "greatest error",
+        "as the discrete answer",
+    )
     rows = [
         (
             str(row["size"]),
@@ -106,7 +117,7 @@ def _modes(own: dict[str, Any], title: str) -> Table:
         for row in own["rows"]
     ]
     rows.append(("limit", *(f"{value:.6g}" for value in own["limit"]), "", ""))
-    return Table(title, headings, tuple(rows), (f"Observed order of the error: {own['order']:.3g}.",))
+    return Table(title, headings, tuple(rows), (f"Observed order of the error: {own['order']:.3g}. {note}",))
 
 
 def _moduli(record: dict[str, Any]) -> Table:
