@@ -23,7 +23,7 @@ COMPILER = shutil.which("cc") or shutil.which("gcc")
 
 def checked(name: str, energy: str | None = None, **options: Any) -> Checked:
     return check(
-        f"{ZOO}:{name}" if name[0].islower() and "." not in name else name, Options(energy=energy, count=10, **options)
+        f"{ZOO}:{name}" if name[0].islower() and "." not in name else name, Options(energy=energy, count=6, **options)
     )
 
 
@@ -43,7 +43,7 @@ def said(found: Checked) -> str:
 @pytest.mark.parametrize("energy", ["stretch", "bending", "shear", "parallel_contact"])
 @pytest.mark.parametrize("variant", ["accurate", "fast"])
 def test_kernels_of_the_package_pass(energy: str, variant: str) -> None:
-    found = checked(f"yarnverify.kernels.{variant}.{energy}", extreme=True)
+    found = check(f"yarnverify.kernels.{variant}.{energy}", Options(count=4, extreme=True))
     assert found.passes, said(found)
     if variant == "accurate":
         assert max(block.error for block, _ in found.found) <= 16
@@ -165,7 +165,7 @@ def test_a_crash_is_found_and_survived() -> None:
 def test_a_hang_is_found_and_ended() -> None:
     found = checked("stretch_hang", regimes=("moderate",), time_limit=0.5)
     assert [text for text, *_ in found.troubles] == ["does not come back within 0.5 s"]
-    assert found.cases.points.parameters["k_s"][found.troubles[0][2]] > 1.9
+    assert found.cases.points.parameters["k_s"][found.troubles[0][2]] > 1.5
 
 
 def test_an_exception_is_a_finding_where_there_is_a_value() -> None:
