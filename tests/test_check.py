@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -440,3 +441,18 @@ def test_the_command_and_its_exit_status(tmp_path: Path, capsys: pytest.CaptureF
 def test_the_record_is_the_same_every_time() -> None:
     first, second = (json.dumps(record(checked("bending_transposed"))) for _ in range(2))
     assert first == second
+
+
+def test_the_example_of_the_readme(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    readme = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+    source = re.search(r"<!-- mine.py -->\n```\n(.*?)```", readme, re.DOTALL)
+    shown = re.search(r"<!-- output of: yarnverify (check mine.py.*?) -->\n```\n(.*?)```", readme, re.DOTALL)
+    assert source is not None and shown is not None
+    (tmp_path / "mine.py").write_text(source[1])
+    monkeypatch.chdir(tmp_path)
+    assert run(*shown[1].split()) == 1
+    assert shown[2] in capsys.readouterr().out
+    (tmp_path / "mine.py").write_text(source[1].replace("- 1) * w", "- 1) * (x1 - x0) / np.linalg.norm(x1 - x0)"))
+    assert run(*shown[1].split(), "--regime", "moderate") == 0
