@@ -136,7 +136,9 @@ class Run:
             ):
                 before, Q, iterations = Q, found.Q, iterations + found.iterations
             rows.append(self._watched(number + 1.0, Q, None))
-            own = partial(dict, {"Q": Q, "Q before": before, "stage": number + 1, "iterations": iterations})
+            own: Callable[[], State] = partial(
+                dict, {"Q": Q, "Q before": before, "stage": number + 1, "iterations": iterations}
+            )
             yield Reached(number + 1.0, Q, partial(self._saved, rows, len(rows), own))
 
     def _tell(self, number: int) -> Callable[[Any], None] | None:
