@@ -467,7 +467,7 @@ def simulate(
         found, lines = run(scene, size or (), settings or (), solver, out, resume, every, pictures, tell)
     if not _json({"result": found.result, "timings": found.timings}, json_file):
         print("\n".join([*study_lines(found.result, found.timings), *lines]))
-    if found.failures:
+    if found.missed:
         sys.exit(1)
 
 
