@@ -90,6 +90,7 @@ class System:
         self.scatter: Scatter = Loops() if self.engine == "compiled" else Arrays()
         self._forms: list[Form] = [form_of(t.kernel) if definite == "quick" else eigenvalues for t in self.terms]
         self._memory: dict[tuple[int, int], list[Array]] = {}
+        self._batches: dict[tuple[int, str], tuple[Term, Batch]] = {}  # with its term, whose id is taken as long
         self.seconds = {"kernels": 0.0, "assembly": 0.0}
         self.nodes, self.coordinates = owners(np.asarray(Q, float), self.active, tables)
 
@@ -231,10 +232,8 @@ class System:
 
     def _run(self, term: Term, wanted: str, q: Array, part: Any, fresh: bool = False) -> list[Array]:
         start = perf_counter()
-        kept = [] if fresh else [self._output(*q.shape)["EGH".index(key)] for key in wanted]
-        out: Any = None if fresh else kept if len(kept) > 1 else kept[0]
         try:
-            found = Batch(term.kernel.KERNEL, wanted, q, term.some(part), out=out, engine=self.engine).results()
+            found = self._batch(term, wanted, q, part, fresh).again()
         except ElementError as error:
             at = error.elements + (part.start if isinstance(part, slice) else 0)
             reason = str(error).partition(f"element {error.elements[0]}: ")[2]
@@ -242,6 +241,19 @@ class System:
         finally:
             self.seconds["kernels"] += perf_counter() - start
         return found
+
+    def _batch(self, term: Term, wanted: str, q: Array, part: Any, fresh: bool) -> Batch:
+        """The call of a kernel; that of a table of one chunk is kept, since making it costs more than a few elements do."""
+        whole = not fresh and q.shape[1] == term.table.count
+        key = (id(term), wanted)
+        if whole and key in self._batches:
+            return self._batches[key][1]
+        kept = [] if fresh else [self._output(*q.shape)["EGH".index(letter)] for letter in wanted]
+        out: Any = None if fresh else kept if len(kept) > 1 else kept[0]
+        made = Batch(term.kernel.KERNEL, wanted, q, term.some(part), out=out, engine=self.engine)
+        if whole:
+            self._batches[key] = term, made
+        return made
 
     def _form(self, number: int, term: Term, q: Array, part: slice, packed: Array) -> None:
         start = perf_counter()

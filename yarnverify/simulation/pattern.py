@@ -7,7 +7,9 @@ unknowns is read from these sums.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -173,8 +175,16 @@ class Pattern:
 
     def matrix(self, sums: Array) -> sparse.csc_array:
         """The full symmetric matrix of sums (sums + 9,)."""
+        found = copy(self._empty)
+        found.data = sums.take(self._source)
+        return found
+
+    @cached_property
+    def _empty(self) -> sparse.csc_array:
+        """The matrix without its values, checked once."""
         shape = (self.count, self.count)
-        found = sparse.csc_array((sums.take(self._source), self.indices, self.indptr), shape=shape)
+        nothing = np.broadcast_to(np.zeros(1), self.indices.shape)
+        found = sparse.csc_array((nothing, self.indices, self.indptr), shape=shape)
         found.has_sorted_indices = True
         found.has_canonical_format = True
         return found
