@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import replace
-from time import perf_counter
+from time import thread_time
 from typing import Any, Literal
 
 import numpy as np
@@ -56,7 +56,7 @@ class System:
     Attributes
     ----------
     seconds
-        Time spent so far, by ``kernels`` and ``assembly``.
+        Processor time spent so far, by ``kernels`` and ``assembly``.
     """
 
     def __init__(
@@ -154,16 +154,16 @@ class System:
                 e, g, packed = self._run(term, "EGH", q, part)
                 if definite:
                     self._form(number, term, q, part, packed)
-            start = perf_counter()
+            start = thread_time()
             total += float(np.add.reduce(e))
             force = max(force, float(g.max(initial=0.0)), -float(g.min(initial=0.0)))
             self.scatter.entries(slope, term.table.rows[:, part], g)
             if packed is not None:
                 self.scatter.blocks(sums, places, part, packed, places.pairs)
-            self.seconds["assembly"] += perf_counter() - start
-        start = perf_counter()
+            self.seconds["assembly"] += thread_time() - start
+        start = thread_time()
         matrix = self.pattern.matrix(sums)
-        self.seconds["assembly"] += perf_counter() - start
+        self.seconds["assembly"] += thread_time() - start
         return Evaluation(total, (slope - self.loads)[self.active], matrix, force)
 
     def worst(self, Q: Array) -> Worst | None:
@@ -218,9 +218,9 @@ class System:
                 part = slice(start, min(start + CHUNK, n))
                 rows = term.table.rows[:, part]
                 q = self._output(rows.shape[0], rows.shape[1])[3]
-                before = perf_counter()
+                before = thread_time()
                 np.take(Q, rows, out=q, mode="clip")
-                self.seconds["assembly"] += perf_counter() - before
+                self.seconds["assembly"] += thread_time() - before
                 yield term, number, part, q
 
     def _output(self, dof: int, n: int) -> list[Array]:
@@ -231,7 +231,7 @@ class System:
         return self._memory[dof, n]
 
     def _run(self, term: Term, wanted: str, q: Array, part: Any, fresh: bool = False) -> list[Array]:
-        start = perf_counter()
+        start = thread_time()
         try:
             found = self._batch(term, wanted, q, part, fresh).again()
         except ElementError as error:
@@ -239,7 +239,7 @@ class System:
             reason = str(error).partition(f"element {error.elements[0]}: ")[2]
             raise ElementError(f"{term.name}: element {at[0]}: {reason}", at) from None
         finally:
-            self.seconds["kernels"] += perf_counter() - start
+            self.seconds["kernels"] += thread_time() - start
         return found
 
     def _batch(self, term: Term, wanted: str, q: Array, part: Any, fresh: bool) -> Batch:
@@ -256,9 +256,9 @@ class System:
         return made
 
     def _form(self, number: int, term: Term, q: Array, part: slice, packed: Array) -> None:
-        start = perf_counter()
+        start = thread_time()
         self._forms[number](q, term.some(part), packed, self.pattern.places[number].pairs.tolist())
-        self.seconds["kernels"] += perf_counter() - start
+        self.seconds["kernels"] += thread_time() - start
 
 
 def _indices(active: ArrayLike, size: int) -> Array:
