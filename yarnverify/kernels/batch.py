@@ -86,7 +86,17 @@ class Batch:
     def again(self) -> list[Array]:
         """The outputs for what the rows hold by now, which must be the caller's own array of this kind, not a copy."""
         self.reasons.clear()
+        if self.engine == "compiled" and self._kept is not None and 0 < self.n <= CHUNK and not self.watch:
+            margins, choice = self._kept.first(slice(0, self.n))
+            if self._tame(margins, choice):
+                later = np.flatnonzero(~(choice[0] > 0)) if choice.size else np.empty(0, int)
+                if not later.size or not self._second([later], self._kept):
+                    return self.out
         return self.results()
+
+    def _tame(self, margins: Array, choice: Array) -> bool:
+        low, high = np.minimum.reduce(margins, None, initial=1.0), np.maximum.reduce(margins, None, initial=1.0)
+        return bool(low > 1 / self.limit and high < self.limit and np.isfinite(choice).all())
 
     def results(self) -> list[Array]:
         """The outputs, filled.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from time import thread_time
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,7 @@ def solver_for(problem: Problem, matrix: Any) -> Solver:
 
 @dataclass(eq=False)
 class Steps:
-    """Evaluations and solutions of a problem, and the processor time that they take."""
+    """Evaluations and solutions of a problem, and the time that they take."""
 
     problem: Problem
     solver: Solver | None = None
@@ -39,22 +39,22 @@ class Steps:
 
     def evaluate(self, Q: Array, definite: bool = False) -> Evaluation:
         """Energy, gradient and Hessian of a configuration."""
-        start = thread_time()
+        start = perf_counter()
         try:
             return self.problem.evaluate(Q, definite)
         finally:
-            self.seconds["evaluation"] += thread_time() - start
+            self.seconds["evaluation"] += perf_counter() - start
 
     def energy(self, Q: Array) -> float:
         """Energy, infinite where it does not exist."""
-        start = thread_time()
+        start = perf_counter()
         try:
             found = self.problem.energy(Q)
             return found if np.isfinite(found) else np.inf
         except ElementError:
             return np.inf
         finally:
-            self.seconds["evaluation"] += thread_time() - start
+            self.seconds["evaluation"] += perf_counter() - start
 
     def moved(self, Q: Array, step: Array, share: float = 1.0) -> Array:
         """The configuration after a share of a step."""
@@ -137,18 +137,18 @@ class Steps:
     def _factorise(self, matrix: Any) -> Factor:
         if self.solver is None:
             self.solver = solver_for(self.problem, matrix)
-        start = thread_time()
+        start = perf_counter()
         try:
             return self.solver.factorise(matrix)
         finally:
-            self.seconds["solve"] += thread_time() - start
+            self.seconds["solve"] += perf_counter() - start
 
     def _solve(self, factor: Factor, b: Array) -> Array:
-        start = thread_time()
+        start = perf_counter()
         try:
             return factor.solve(b)
         finally:
-            self.seconds["solve"] += thread_time() - start
+            self.seconds["solve"] += perf_counter() - start
 
 
 def _short(Q: Array, step: Array) -> Array:

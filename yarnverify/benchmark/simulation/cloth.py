@@ -92,6 +92,7 @@ class Cloth:
             if solver == "direct"
             else ConjugateGradients(lines_of(fabric, system))
         )
+        system.clock = thread_time
         dynamics.solver = timed = Timed(chosen)
         Q = fabric.Q.copy()
         x, y, z = fabric.points(Q).T

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import time
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from math import isfinite, log
 from typing import Any
 
@@ -131,7 +132,7 @@ def _cloth(side: int, solver: str, rounds: int, advance: Advance, steps: int) ->
 def _growth(found: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Exponents of growth from each size to the next."""
     lines = []
-    for one, two in zip(found, found[1:], strict=False):
+    for one, two in pairwise(found):
         scale = log(two["crossings"] / one["crossings"])
         a = one["seconds"] | {"linear solve": one["seconds"]["factorise"] + one["seconds"]["solve"]}
         b = two["seconds"] | {"linear solve": two["seconds"]["factorise"] + two["seconds"]["solve"]}
