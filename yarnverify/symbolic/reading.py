@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from yarnverify.symbolic.document import Section
+from yarnverify.symbolic.functions import unfolded
 from yarnverify.symbolic.tree import Expr, Name
 
 Value = Any
@@ -77,6 +78,8 @@ class Reading(ABC):
             return blocks(expr)
         if op == "symbol":
             return self.symbol(expr.name)
+        if op == "call" and (plain := unfolded(expr)) is not None:
+            return self.value(plain, blocks)
         values = [self.value(arg, blocks) for arg in args]
         match op:
             case "number":

@@ -8,6 +8,7 @@ from typing import Any
 
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.forward import Evaluation
+from yarnverify.symbolic.functions import unfolded
 from yarnverify.symbolic.numbers import Floats, NoValueError, UndefinedError
 from yarnverify.symbolic.tree import Expr, Name, Type
 
@@ -29,6 +30,8 @@ def sided(section: Section, trees: Iterable[Expr]) -> list[Expr]:
                 meaning = section.meaning(node.name)
                 if meaning is not None:
                     visit(meaning)
+            elif node.op == "call" and (plain := unfolded(node)) is not None:
+                visit(plain)
             elif (
                 node.op in {"abs", "sqrt"}
                 or (node.op == "norm" and section.type_of(node.args[0]) is Type.SCALAR)
