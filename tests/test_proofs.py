@@ -13,11 +13,11 @@ import pytest
 
 from yarnverify.library import Shelf, errata, shelf_for
 from yarnverify.source import Source
+from yarnverify.symbolic.algebraic import UndefinedError
 from yarnverify.symbolic.court import Court, Verdict, _Comparison
 from yarnverify.symbolic.declare import Declarations
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.forward import Evaluation
-from yarnverify.symbolic.numbers import UndefinedError
 from yarnverify.symbolic.prove import read_with, try_document
 from yarnverify.symbolic.reader import read_formula
 from yarnverify.symbolic.reading import UnsupportedError

@@ -156,7 +156,7 @@ def _plain_steps(energy: Energy) -> list[Step]:
     court = Court(declared_section(energy), energy.expression)
     blocks = [Expr("force", value=name) for name in energy.unknowns]
     values = [
-        (latex(b), f"{plain(b)}: exact, {len(court.names)} symbols") for b in blocks if court.block(b) is not None
+        (latex(b), f"{plain(b)}: exact, {len(court.names)} symbols") for b in blocks if court.forms.true(b) is not None
     ]
     note = "This energy is not a law of known measures: it is differentiated coordinate by coordinate."
     return [_step("Plain differentiation", note, values)]

@@ -19,11 +19,12 @@ from typing import Any
 import flint
 import numpy as np
 
+from yarnverify.symbolic.algebraic import Algebraic, Number, UndefinedError
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.functions import unfolded
 from yarnverify.symbolic.jets import Jet
 from yarnverify.symbolic.linear import linear_form, tree_of
-from yarnverify.symbolic.numbers import Algebraic, Balls, Floats, Number, UndefinedError
+from yarnverify.symbolic.numbers import Balls, Floats
 from yarnverify.symbolic.tree import FORCE, PI, ZERO, Expr, Name
 from yarnverify.symbolic.turns import DRAWN_PARTS, Pair, multiple, of_pi, scaled, turned
 

@@ -113,7 +113,9 @@ def latex(expr: Expr) -> str:
             return f"\\frac{{{latex(args[0])}}}{{{latex(args[1])}}}"
         case "pow":
             exponent = f"^{expr.value}" if len(str(expr.value)) == 1 else f"^{{{expr.value}}}"
-            if args[0].op == "call" and args[0].value not in OF_TWO and len(str(expr.value)) == 1:  # sin^{-1} would be read as the inverse function
+            if (
+                args[0].op == "call" and args[0].value not in OF_TWO and len(str(expr.value)) == 1
+            ):  # sin^{-1} would be read as the inverse function
                 return _call(args[0], exponent)
             return _atom(args[0]) + exponent
         case "transpose":

@@ -1,6 +1,6 @@
 """Polynomials modulo the squares of roots, and quotients of them: what normal forms are computed with.
 
-Relations are ``r^2 = R``, with R over generators that come later in the list. Their leading monomials are pure powers of distinct
+Relations are ``r^2 = R``, with R over generators later in the list. Their leading monomials are pure powers of distinct
 generators, so they are a Groebner basis for the lexicographic order, and the remainder of a polynomial is its normal form.
 """
 
@@ -127,7 +127,8 @@ class Relations:
 
     def split(self, poly: Poly, label: str) -> tuple[Poly, Poly]:
         """``u, v`` of a reduced polynomial ``u + v r``, where r has a square."""
-        position, parts = self._position[label], ({}, {})
+        position = self._position[label]
+        parts: tuple[dict[tuple[int, ...], Any], dict[tuple[int, ...], Any]] = ({}, {})
         for monomial, coefficient in poly.items():
             parts[monomial[position]][(*monomial[:position], 0, *monomial[position + 1 :])] = coefficient
         u, v = (self.ring.from_dict(part) for part in parts)

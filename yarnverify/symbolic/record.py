@@ -13,13 +13,14 @@ import numpy as np
 
 from yarnverify.library import Shelf
 from yarnverify.source import Source
+from yarnverify.symbolic.algebraic import UndefinedError
 from yarnverify.symbolic.court import Verdict
 from yarnverify.symbolic.declare import Declarations, load_declarations
 from yarnverify.symbolic.derive import derive
 from yarnverify.symbolic.document import Section, block_of, instantiate
 from yarnverify.symbolic.forward import Evaluation, entries
 from yarnverify.symbolic.latex import latex
-from yarnverify.symbolic.numbers import Balls, UndefinedError
+from yarnverify.symbolic.numbers import Balls
 from yarnverify.symbolic.prove import Completeness, Judged, Trial, read_with, try_document
 from yarnverify.symbolic.repair import Repair, Workshop, chain_latex, describe
 from yarnverify.symbolic.tree import FORCE, Expr, Name

@@ -6,10 +6,11 @@ from collections.abc import Iterable, Iterator
 from itertools import combinations
 from typing import Any
 
+from yarnverify.symbolic.algebraic import NoValueError, UndefinedError
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.forward import Evaluation
 from yarnverify.symbolic.functions import unfolded
-from yarnverify.symbolic.numbers import Floats, NoValueError, UndefinedError
+from yarnverify.symbolic.numbers import Floats
 from yarnverify.symbolic.tree import Expr, Name, Type
 
 Signature = tuple[int, ...]

@@ -73,20 +73,29 @@ def of_pi(factor: Fraction, one: Any, sqrt: Root) -> Pair | None:
     return None
 
 
-def candidates(angle: Any, known: Sequence[Any]) -> Iterator[tuple[int, dict[int, int], int]]:
-    """How an angle may hang together with others: ``count angle = sum n_j known_j + m pi/60``, as (count, {j: n_j}, m).
+Relation = tuple[int, dict[int, int], int]  # count, {j: n_j} and m of count angle = sum n_j known_j + m pi/60
 
-    All are balls; what is given is close to true, and remains to be proved.
-    """
-    unit = flint.arb.pi() / PARTS_OF_PI
+
+def _parts(relation: Relation, angle: Any, known: Sequence[Any]) -> Any:
+    """Balls of ``count angle - sum n_j known_j`` in parts of pi."""
+    count, total, _ = relation
+    return (angle * count - sum((known[j] * n for j, n in total.items()), flint.arb(0))) * PARTS_OF_PI / flint.arb.pi()
+
+
+def near(relation: Relation, angle: Any, known: Sequence[Any]) -> bool:
+    """Whether balls of an angle and of others allow a relation between them."""
+    return bool(abs(_parts(relation, angle, known) - relation[2]) < _CLOSE)
+
+
+def candidates(angle: Any, known: Sequence[Any]) -> Iterator[Relation]:
+    """How an angle may hang together with others, all given as balls; what is given is close, and remains to be proved."""
     many = [(j, n) for j in range(len(known)) for n in (1, -1, 2, -2, 3, -3, 4, -4)]
     sums: list[dict[int, int]] = [{}, *({j: n} for j, n in many)]
     for (i, j), (m, n) in product(combinations(range(len(known)), 2), product((1, -1, 2, -2), repeat=2)):
         sums.append({i: m, j: n})
     for total, count in product(sums, (1, 2, 4)):
-        parts = (angle * count - sum((known[j] * n for j, n in total.items()), flint.arb(0))) / unit
-        if not parts.is_finite():
-            return
-        whole = int((parts.mid().fmpq() + flint.fmpq(1, 2)).floor())
-        if abs(parts - whole) < _CLOSE:
-            yield count, total, whole
+        parts = _parts((count, total, 0), angle, known)
+        if parts.is_finite():
+            relation = count, total, int((parts.mid().fmpq() + flint.fmpq(1, 2)).floor())
+            if near(relation, angle, known):
+                yield relation
