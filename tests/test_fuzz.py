@@ -190,7 +190,10 @@ def test_what_was_found_is_kept_on_an_interrupt(monkeypatch: pytest.MonkeyPatch)
 
 def test_what_is_asked_for_wrongly() -> None:
     for given_, text in [
-        (("twist", "accurate", 1.0), "there is no energy 'twist'; one of bending, parallel_contact, shear, stretch"),
+        (
+            ("twist", "accurate", 1.0),
+            "there is no energy 'twist'; one of bending, gravity, kinetic, parallel_contact, plane, shear, ",
+        ),
         (("shear", "best", 1.0), "there is no variant 'best'; one of accurate, fast"),
         (("shear", "accurate", 0.0), "--time must be a positive number of seconds, not 0.0"),
         (("shear", "accurate", np.nan), "--time must be a positive number of seconds, not nan"),

@@ -19,6 +19,7 @@ from yarnverify.library import (
     Shelf,
     errata,
     fingerprint,
+    known,
     recall,
     remember,
     shelf_for,
@@ -256,9 +257,23 @@ def test_what_is_remembered_is_recalled(cache: Path) -> None:
     assert [path.name for path in cache.iterdir()] == ["key.json"]
 
 
-@pytest.mark.parametrize("data", [b"", b"{", b"\xff\xfe"])
+def test_a_record_is_made_once_for_the_same_contents(cache: Path) -> None:
+    made: list[int] = []
+
+    def make() -> dict[str, Any]:
+        made.append(len(made))
+        return {"made": len(made)}
+
+    assert known([b"a"], make) == ({"made": 1}, False)
+    assert known([b"a"], make) == ({"made": 1}, True)
+    assert known([b"b"], make) == ({"made": 2}, False)
+    assert known([b"a"], make, cache=False) == ({"made": 3}, False)
+    assert known([b"a"], make) == ({"made": 1}, True)
+
+
+@pytest.mark.parametrize("data", [b"", b"{", b"\xff\xfe", b"1", b'{"key": "other", "record": {}}'])
 def test_a_spoilt_result_is_forgotten(cache: Path, data: bytes) -> None:
-    remember("key", {})
+    remember("key", {"claims": []})
     (cache / "key.json").write_bytes(data)
     assert recall("key") is None
 
@@ -273,7 +288,7 @@ def test_without_the_variable_results_are_kept_at_home(tmp_path: Path, monkeypat
 def test_a_cache_that_cannot_be_written_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    remember("key", 1)
+    remember("key", {"claims": []})
     assert recall("key") is None
 
 

@@ -142,14 +142,11 @@ SHAPES = {
 }  # fmt: skip
 
 
-_PROVED: dict[str, Proved] = {}
-
-
 def made(declared: Energy, variant: str) -> Any:
-    """The module of a declared energy, as ``generate`` would write it."""
-    if declared.name not in _PROVED:
-        _PROVED[declared.name] = proved(declared, Declarations((declared,)))
-    programs, notes = derived_programs(declared, _PROVED[declared.name], variant)
+    """The module of a declared energy, as ``generate`` would write it; what it rests on is proved in a test of its own."""
+    derivation = derive_declared(declared, ())
+    assert derivation is not None
+    programs, notes = derived_programs(declared, Proved(derivation, tuple(safe.safe_shapes(derivation))), variant)
     assert not notes
     text, _ = module_text(declared, variant, programs, "own.md", notes)
     namespace: dict[str, Any] = {}

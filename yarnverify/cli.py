@@ -1,4 +1,5 @@
-"""The command line: ``yarnverify prove | derive | generate | accuracy | benchmark | fuzz | report``.
+"""The command line: ``yarnverify prove | derive | generate | accuracy | benchmark | fuzz | simulate |
+report``.
 
 Exit status: 0 all as expected; 1 a check failed, or an erratum is new or stale; 2 bad usage or input; 3 asked for but
 could not run. Heavy imports happen inside the commands, so that ``--help`` answers at once.
@@ -91,6 +92,35 @@ def progress(what: str) -> Iterator[Callable[[str, int], None]]:
         yield lambda label, total: bar.update(task, advance=1, total=total, label=label)
 
 
+@contextmanager
+def time_left() -> Iterator[Callable[[str, float], None]]:
+    """A bar on standard error, if that is a terminal, that takes the share of all that is done."""
+    if not sys.stderr.isatty():
+        yield lambda label, done: None
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        BarColumn(),
+        TaskProgressColumn(),
+        TextColumn("{task.fields[label]}"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("simulating", total=1.0, label="")
+        yield lambda label, done: bar.update(task, completed=max(done, bar.tasks[0].completed), label=label)
+
+
 @app.command
 def prove(
     document: Path | None = None,
@@ -146,12 +176,13 @@ def generate(
     *,
     check: Annotated[bool, Parameter(negative="", help="Compare with the files instead of writing them.")] = False,
     json_file: Json = None,
+    cache: Annotated[bool, Parameter(help="Use and keep results that are already known.")] = True,
 ) -> None:
     """The kernels, from the derivations."""
     from yarnverify.generation import generate_kernels
 
     with progress("generating") as advance:
-        outcome = generate_kernels(check, advance)
+        outcome = generate_kernels(check, advance, cache)
     _finish(outcome, json_file)
 
 
@@ -256,6 +287,50 @@ def report(
     with progress("reporting") as advance:
         outcome = build_report(out, check, advance, pictures)
     _finish(outcome, json_file)
+
+
+@app.command
+def simulate(
+    scene: str | None = None,
+    /,
+    *,
+    size: Annotated[
+        list[int] | None,
+        Parameter(help="Sizes to run; by default those of the scene.", consume_multiple=True, negative=""),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        Parameter(name="--set", help="A parameter, name=value.", consume_multiple=True, negative=""),
+    ] = None,
+    solver: Annotated[str | None, Parameter(help="Linear solver: direct or superlu; all by default.")] = None,
+    out: Annotated[
+        Path | None, Parameter(help="Folder for results, states, pictures; none are written without.")
+    ] = None,
+    resume: Annotated[bool, Parameter(negative="", help="Go on with the run in --out that was interrupted.")] = False,
+    every: Annotated[float, Parameter(help="Seconds between states that are kept in --out.")] = 10.0,
+    pictures: Annotated[bool, Parameter(help="Draw what was found into --out.")] = True,
+    json_file: Json = None,
+) -> None:
+    """A reference scene, compared with its known answer.
+
+    Parameters
+    ----------
+    scene
+        Its name, or a Python file of your own that declares one. All are listed without.
+    """
+    from yarnverify.simulation.command import listing
+    from yarnverify.simulation.command import simulate as run
+    from yarnverify.simulation.show import study_lines
+
+    if scene is None:
+        print("\n".join(listing()))
+        return
+    with time_left() as tell:
+        found, lines = run(scene, size or (), settings or (), solver, out, resume, every, pictures, tell)
+    if not _json({"result": found.result, "timings": found.timings}, json_file):
+        print("\n".join([*study_lines(found.result, found.timings), *lines]))
+    if found.failures:
+        sys.exit(1)
 
 
 @app.command

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from yarnverify.library import MAIN_DOCUMENT, derivations
+from yarnverify.library import MAIN_DOCUMENT, declared_files, derivations, known
 
 DEFAULT_VARIANT = "accurate"
 WRITTEN_BY_HAND = {
@@ -76,19 +76,36 @@ def settle_files(folder: Path, texts: dict[str, str], check: bool, stale: list[s
     return outcome
 
 
-def generate_kernels(check: bool, advance: Callable[[str, int], None] = lambda label, total: None) -> Outcome:
+def generate_kernels(
+    check: bool, advance: Callable[[str, int], None] = lambda label, total: None, cache: bool = True
+) -> Outcome:
     """Generate every variant of every declared energy of the main document.
+
+    Parameters
+    ----------
+    check
+        Compare instead of writing.
+    advance
+        Called as each module is made.
+    cache
+        Whether what the same derivations gave in an earlier run is used and kept.
 
     Raises
     ------
     InputError, NotRunError
         For derivations that cannot be read or proved, and files that cannot be written.
     """
-    from yarnverify.symbolic.modules import kernel_modules
+
+    def make() -> dict[str, Any]:
+        from yarnverify.symbolic.modules import kernel_modules
+
+        texts, counts = kernel_modules(derivations(), MAIN_DOCUMENT, DEFAULT_VARIANT, advance)
+        return {"texts": texts, "counts": counts}
 
     folder = Path(__file__).parent / "kernels"
-    texts, record = kernel_modules(derivations(), MAIN_DOCUMENT, DEFAULT_VARIANT, advance)
+    made, _ = known([b"kernels", DEFAULT_VARIANT.encode(), *declared_files(derivations())], make, cache)
+    texts = made["texts"]
     there = {path.relative_to(folder).as_posix() for path in folder.rglob("*.py")}
     outcome = settle_files(folder, texts, check, sorted(there - set(texts) - WRITTEN_BY_HAND), "yarnverify generate")
-    outcome.record = record
+    outcome.record = made["counts"]
     return outcome

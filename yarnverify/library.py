@@ -11,7 +11,7 @@ import os
 import re
 import sys
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -58,6 +58,11 @@ def derivations() -> Path:
     package = Path(__file__).parent
     installed = package / "derivations"
     return installed if installed.is_dir() else package.parent / "derivations"
+
+
+def declared_files(folder: Path) -> list[Path]:
+    """What all that is derived depends on: the declared energies of a folder and its documents, sorted."""
+    return sorted([*folder.glob("*.py"), *folder.glob("*.md")])
 
 
 def _displays(text: str) -> set[str]:
@@ -142,16 +147,17 @@ def errata(shelf: Shelf) -> tuple[Erratum, ...]:
 
 
 def fingerprint(parts: Iterable[bytes | Path]) -> str:
-    """Hash of contents: of bytes, of files, and of all that decides a verdict in this package."""
+    """Hash of contents: of bytes, of files, and of all that decides a verdict or a kernel in this package."""
     import importlib.metadata
 
     digest = hashlib.sha256()
     package = Path(__file__).parent
-    own = sorted([*package.glob("*.py"), *(package / "symbolic").glob("*.py"), *(package / "symbolic").glob("*.lark")])
+    symbolic = (path for path in (package / "symbolic").rglob("*") if path.suffix in (".py", ".lark", ".jinja"))
+    own = sorted([*package.glob("*.py"), *(package / "kernels").glob("*.py"), *symbolic])
     for part in [*parts, sys.version.encode(), *own]:
         data = part.read_bytes() if isinstance(part, Path) else part
         digest.update(len(data).to_bytes(8, "big") + data)
-    for name in ("sympy", "python-flint", "lark"):
+    for name in ("sympy", "python-flint", "lark", "jinja2"):
         digest.update(importlib.metadata.version(name).encode())
     return digest.hexdigest()
 
@@ -162,13 +168,38 @@ def cache_folder() -> Path:
     return Path(base) / "yarnverify"
 
 
+def known(
+    parts: Iterable[bytes | Path], make: Callable[[], dict[str, Any]], cache: bool = True
+) -> tuple[dict[str, Any], bool]:
+    """A record as JSON holds it, and whether it was there from an earlier run.
+
+    Parameters
+    ----------
+    parts
+        All that the record is made from, besides this package.
+    make
+        Makes the record.
+    cache
+        Whether a record that is there is used and a new one is kept.
+    """
+    if not cache:
+        return make(), False
+    key = fingerprint(parts)
+    record = recall(key)
+    if record is not None:
+        return record, True
+    record = make()
+    remember(key, record)
+    return record, False
+
+
 def recall(key: str) -> dict[str, Any] | None:
     """A record stored under a fingerprint, or None."""
     try:
-        record = json.loads((cache_folder() / f"{key}.json").read_text(encoding="utf-8"))
+        kept = json.loads((cache_folder() / f"{key}.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return record if isinstance(record, dict) and "claims" in record else None
+    return kept["record"] if isinstance(kept, dict) and kept.get("key") == key else None
 
 
 def remember(key: str, record: Any) -> None:
@@ -177,7 +208,7 @@ def remember(key: str, record: Any) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         draft = path.with_suffix(f".{os.getpid()}.tmp")
-        draft.write_text(json.dumps(record), encoding="utf-8")
+        draft.write_text(json.dumps({"key": key, "record": record}), encoding="utf-8")
         draft.replace(path)
     except OSError:
         return

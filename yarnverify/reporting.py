@@ -10,7 +10,7 @@ from typing import Any
 
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.generation import Outcome, generate_kernels, settle_files
-from yarnverify.library import MAIN_DOCUMENT, derivations
+from yarnverify.library import MAIN_DOCUMENT, declared_files, derivations, known
 from yarnverify.show import mistake_lines, tally_lines
 from yarnverify.verdicts import verdicts
 
@@ -112,7 +112,11 @@ def _records(advance: Callable[[str, int], None]) -> tuple[dict[str, Any], list[
     energies.sort(key=lambda energy: order.index(energy.section) if energy.section in order else len(order))
     derived = {}
     for energy in energies:
-        derived[energy.name] = {"section": energy.section, **explain_energy(energy, declarations)}
+        explained, _ = known(
+            [b"derivation", energy.name.encode(), *declared_files(derivations())],
+            partial(explain_energy, energy, declarations),
+        )
+        derived[energy.name] = {"section": energy.section, **explained}
         advance(f"explaining {energy.name}", len(energies))
     lines = [*mistake_lines(found), *tally_lines(found), f"{took}."]
     if kernels.differs:

@@ -13,9 +13,7 @@ from yarnverify.library import (
     Shelf,
     derivations,
     errata,
-    fingerprint,
-    recall,
-    remember,
+    known,
     shelf_for,
 )
 from yarnverify.source import load
@@ -56,18 +54,16 @@ def verdicts(
         shelf.how.encode(),
     ]
     parts += sorted(shelf.folder.glob("*.py")) if shelf.folder else []
-    key = fingerprint(parts)
-    record = recall(key) if cache else None
-    known = record is not None
-    if record is None:
+
+    def make() -> dict[str, Any]:
         from yarnverify.symbolic.record import prove_source
 
-        record = prove_source(source, shelf, advance)
-        if cache:
-            remember(key, record)
+        return prove_source(source, shelf, advance)
+
+    record, earlier = known([b"verdicts", *parts], make, cache)
     settle(record, shelf, errata(shelf))
     seconds = time.perf_counter() - start
-    return record, f"{'known from an earlier run' if known else 'derived and proved'} in {seconds:.2f} s"
+    return record, f"{'known from an earlier run' if earlier else 'derived and proved'} in {seconds:.2f} s"
 
 
 def settle(record: dict[str, Any], shelf: Shelf, accepted: tuple[Erratum, ...]) -> None:

@@ -8,11 +8,11 @@ Elements go through kernel and sum a chunk at a time, in memory that is kept: no
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from time import perf_counter
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,68 +20,18 @@ from scipy import sparse
 
 from yarnverify.kernels import ElementError
 from yarnverify.kernels.batch import Batch
+from yarnverify.kernels.inputs import check_options
 from yarnverify.simulation import scatter
+from yarnverify.simulation.owners import owners
 from yarnverify.simulation.pattern import Elements, Pattern, zeros
+from yarnverify.simulation.problem import Evaluation, Worst
 from yarnverify.simulation.semidefinite import ALONE, Form, eigenvalues, form_of
-from yarnverify.simulation.tables import Table
+from yarnverify.simulation.terms import Term
+
+__all__ = ["CHUNK", "Evaluation", "System", "Term", "Worst"]
 
 Array = NDArray[Any]
 CHUNK = 8192
-
-
-@dataclass(frozen=True, eq=False)
-class Term:
-    """One energy on all elements of a table.
-
-    Attributes
-    ----------
-    kernel
-        A module of ``yarnverify.kernels`` or one like it (``DOFS``, ``PARAMETERS``, ``KERNEL``, ``packed``).
-    table
-        The elements.
-    parameters
-        Values of the kernel's parameters that the table does not know, each a number or (n,).
-    name
-        The kernel's, unless given.
-    """
-
-    kernel: Any
-    table: Table
-    parameters: Mapping[str, ArrayLike] = field(default_factory=dict)
-    name: str = ""
-
-    def __post_init__(self) -> None:
-        if not self.name:
-            object.__setattr__(self, "name", self.kernel.KERNEL.name)
-        values = {**self.table.parameters, **self.parameters}
-        missing, unknown = set(self.kernel.PARAMETERS) - set(values), set(self.parameters) - set(self.kernel.PARAMETERS)
-        if missing or unknown:
-            wrong = ", ".join(sorted(missing or unknown))
-            raise ValueError(f"{self.name}: {'needs' if missing else 'has no'} parameter {wrong}")
-        object.__setattr__(self, "parameters", {k: np.asarray(values[k], float) for k in self.kernel.PARAMETERS})
-
-    def some(self, part: Any) -> dict[str, Any]:
-        """Parameters of some elements."""
-        vectors = self.kernel.KERNEL.vectors
-        return {k: v if np.ndim(v) == (k in vectors) else v[..., part] for k, v in self.parameters.items()}
-
-
-class Evaluation(NamedTuple):
-    """Energy, gradient (active,) and Hessian (active, active) of a state, and the size of the forces in it."""
-
-    energy: float
-    gradient: Array
-    matrix: sparse.csc_array
-    force: float
-
-
-class Worst(NamedTuple):
-    """The element that holds most of the greatest residual."""
-
-    term: str
-    index: int
-    energy: float
-    state: Array
 
 
 class System:
@@ -123,14 +73,15 @@ class System:
     ) -> None:
         self.size = np.size(Q)
         self.terms = tuple(terms)
-        self.active = np.unique(np.asarray(active, np.int64))
-        if self.active.size != np.size(active):
-            raise ValueError("an unknown is listed twice among the active ones")
-        if self.active.size and not (self.active[0] >= 0 and self.active[-1] < self.size):
-            raise ValueError(f"unknowns must be indices into a configuration of {self.size} entries")
+        self.active = _indices(active, self.size)
+        if definite not in ("quick", "eigenvalues"):
+            raise ValueError(f"definite must be 'quick' or 'eigenvalues', not {definite!r}")
+        check_options("raise", 1, engine)
         self.loads = np.zeros(self.size) if loads is None else np.array(loads, float)
         if self.loads.shape != (self.size,):
             raise ValueError(f"loads must have shape ({self.size},), not {self.loads.shape}")
+        if not np.isfinite(self.loads).all():
+            raise ValueError(f"loads must be finite, but load {np.flatnonzero(~np.isfinite(self.loads))[0]} is not")
         for term in self.terms:
             rows = term.table.rows
             if rows.size and not (rows.min() >= 0 and rows.max() < self.size):
@@ -142,27 +93,7 @@ class System:
         self._forms: list[Form] = [form_of(t.kernel) if definite == "quick" else eigenvalues for t in self.terms]
         self._memory: dict[tuple[int, int], list[Array]] = {}
         self.seconds = {"kernels": 0.0, "assembly": 0.0}
-        self.nodes, self.coordinates = self._owners(np.asarray(Q, float), tables)
-
-    @staticmethod
-    def _heads(tables: Sequence[Elements], size: int) -> tuple[Array, Array]:
-        """The entry that stands for the node of each entry of a configuration, and which of them are points."""
-        head, point = np.arange(size), np.zeros(size, bool)
-        for table in tables:
-            at = dict(zip(table.labels, table.rows, strict=True))
-            for label, row in at.items():
-                name, _, axis = label.partition(".")
-                x = at.get(f"{name}.x" if axis else f"x{name[1:]}.x")
-                if x is not None:  # a sliding coordinate u1 lies at the point x1
-                    head[row] = x
-                    point[x] = True
-        return head, point
-
-    def _owners(self, Q: Array, tables: Sequence[Elements]) -> tuple[Array, Array | None]:
-        """The node of each unknown (active,), and coordinates of the nodes (nodes, 3) if all have some."""
-        head, point = self._heads(tables, self.size)
-        heads, nodes = np.unique(head[self.active], return_inverse=True)
-        return nodes, Q[heads[:, None] + np.arange(3)] if point[heads].all() else None
+        self.nodes, self.coordinates = owners(np.asarray(Q, float), self.active, tables)
 
     @property
     def count(self) -> int:
@@ -302,14 +233,14 @@ class System:
 
     def _run(self, term: Term, wanted: str, q: Array, part: Any, fresh: bool = False) -> list[Array]:
         start = perf_counter()
-        out = None if fresh else [self._output(*q.shape)["EGH".index(key)] for key in wanted]
-        if out is not None and len(out) == 1:
-            out = out[0]
+        kept = [] if fresh else [self._output(*q.shape)["EGH".index(key)] for key in wanted]
+        out: Any = None if fresh else kept if len(kept) > 1 else kept[0]
         try:
             found = Batch(term.kernel.KERNEL, wanted, q, term.some(part), out=out, engine=self.engine).results()
         except ElementError as error:
             at = error.elements + (part.start if isinstance(part, slice) else 0)
-            raise ElementError(f"{error} (of {term.name}, from element {at[0]} of the system)", at) from None
+            reason = str(error).partition(f"element {error.elements[0]}: ")[2]
+            raise ElementError(f"{term.name}: element {at[0]}: {reason}", at) from None
         finally:
             self.seconds["kernels"] += perf_counter() - start
         return found
@@ -318,3 +249,16 @@ class System:
         start = perf_counter()
         self._forms[number](q, term.some(part), packed, self.pattern.places[number].pairs.tolist())
         self.seconds["kernels"] += perf_counter() - start
+
+
+def _indices(active: ArrayLike, size: int) -> Array:
+    """The unknowns in order."""
+    given = np.asarray(active)
+    if given.size and given.dtype.kind not in "iu":
+        raise ValueError(f"unknowns are indices, whole numbers, not {given.dtype}")
+    found = np.unique(given.astype(np.int64))
+    if found.size != given.size:
+        raise ValueError("an unknown is listed twice among the active ones")
+    if found.size and not (found[0] >= 0 and found[-1] < size):
+        raise ValueError(f"unknowns must be indices into a configuration of {size} entries")
+    return found

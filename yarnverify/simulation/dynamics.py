@@ -18,17 +18,19 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from yarnverify.errors import InputError
 from yarnverify.kernels import ElementError
 from yarnverify.simulation.assembly import System, Term
 from yarnverify.simulation.increment import Increment
 from yarnverify.simulation.inertia import Inertia, elements_of
 from yarnverify.simulation.linear import LinearSolveError, Solver, SuperLU
 from yarnverify.simulation.newton import minimise
-from yarnverify.simulation.search import NotConverged
+from yarnverify.simulation.search import NotConverged, solver_for
 
 Array = NDArray[Any]
 Scheme = Literal["implicit_euler", "midpoint", "bdf2"]
 ORDERS: Mapping[str, int] = {"implicit_euler": 1, "midpoint": 2, "bdf2": 2}
+NEARLY = 1e-9  # of a step: what is left of the time is less than a step only if it is so by more
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +51,8 @@ class Motion:
         One step before.
     steps, rejected, error
         Steps so far, steps that were made again smaller, and the estimated error of the last one, m.
+    lost
+        What rounding has taken from the time, s: steps add up to what their number says.
     """
 
     time: float
@@ -64,17 +68,25 @@ class Motion:
     steps: int = 0
     rejected: int = 0
     error: float = 0.0
+    lost: float = 0.0
+
+    @property
+    def energy(self) -> float:
+        """Kinetic and potential, J."""
+        return self.kinetic + self.potential
 
     def arrays(self) -> dict[str, Any]:
         """All of it by name, to save."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
-    @staticmethod
-    def of(arrays: Mapping[str, Any]) -> Motion:
-        """From what ``arrays`` gave."""
-        numbers = {"steps": int, "rejected": int}
-        return Motion(**{f.name: np.array(arrays[f.name], float) if np.ndim(arrays[f.name])
-                         else numbers.get(f.name, float)(arrays[f.name]) for f in fields(Motion)})  # fmt: skip
+    @classmethod
+    def of(cls, arrays: Mapping[str, Any]) -> Motion:
+        """From what ``arrays`` gave; the same bits."""
+        whole, vectors = ("steps", "rejected"), ("Q", "P", "V", "Q_before", "P_before")
+        made: dict[str, Any] = {name: int(arrays[name]) for name in whole}
+        made |= {name: np.array(arrays[name], float) for name in vectors}
+        made |= {f.name: float(arrays[f.name]) for f in fields(cls) if f.name not in made}
+        return cls(**made)
 
 
 class Dynamics:
@@ -109,16 +121,29 @@ class Dynamics:
         **options: Any,
     ) -> None:
         if scheme not in ORDERS:
-            raise ValueError(f"scheme must be one of {', '.join(ORDERS)}, not {scheme!r}")
+            raise InputError(f"scheme must be one of {', '.join(ORDERS)}, not {scheme!r}")
         self.system = System(Q, terms, active, loads, others=[elements_of(kinetic)], engine=engine)
-        self.inertia = Inertia(self.system, kinetic, moving=held is not None)
-        self.scheme, self.solver, self.held = scheme, solver, held
+        self.inertia = Inertia(self.system, kinetic)
+        self.scheme, self.held = scheme, held
         self.options = {"residual": 1e-13, "stable": False, "iterations": 100, **options}
+        self.solver = solver
+        self._own: dict[str, Solver] = {}
+        self._fixed = np.ones(self.system.size, bool)
+        self._fixed[self.system.active] = False
 
     def start(self, Q: ArrayLike, V: ArrayLike | None = None, time: float = 0.0) -> Motion:
-        """The state at rest or with velocities (size,), m/s."""
+        """The state at rest or with velocities (size,), m/s.
+
+        Raises
+        ------
+        ElementError
+            An element has no energy there.
+        """
         Q = np.array(Q, float)
         V = np.zeros(Q.size) if V is None else np.array(V, float)
+        for name, given in (("Q", Q), ("V", V)):
+            if given.shape != (self.system.size,) or not np.isfinite(given).all():
+                raise InputError(f"a motion starts with {self.system.size} finite numbers {name}, not {given.shape}")
         found = self.inertia.kinetic(Q, V)
         return Motion(time, Q, found.momentum, V, found.energy, self.system.energy(Q), 0.0, 0.0, Q, found.momentum)
 
@@ -128,59 +153,61 @@ class Dynamics:
         Raises
         ------
         NotConverged
-            The step could not be solved for.
+            The step could not be solved for; the state before it is whole.
         """
+        _positive(h=h)
         problem = self._increment(motion, h)
-        first = motion.Q + h * motion.V
-        start = motion.Q.copy()
-        start[self.system.active] = first[self.system.active]
-        if self.held is not None:
-            self.held(motion.time + h, start)
         try:
-            end = self._solve(problem, start)
-        except ElementError:  # the velocity leads out of the domain
-            calm = start.copy()
-            calm[self.system.active] = motion.Q[self.system.active]
-            end = self._solve(problem, calm)
-        q, v = problem.at(end), problem.rate(end)
-        found = self.inertia.kinetic(q, v)
-        force = found.slope - self.system.slope(q)
+            end = self._end(problem, motion, h)
+            q, v = problem.at(end), problem.rate(end)
+            found = self.inertia.kinetic(q, v)
+            force = found.slope - self.system.slope(q)
+            potential = self.system.energy(q)
+        except (NotConverged, ElementError, LinearSolveError) as error:
+            reason = f"the step of {h:.6g} s from time {motion.time:.6g} s has no end: "
+            if isinstance(error, NotConverged):
+                raise NotConverged(reason + error.reason, error.Q, error.history, error.worst) from error
+            raise NotConverged(reason + str(error), motion.Q, [], None) from error
         if self.scheme == "midpoint":
             momentum = motion.P + h * force
             momentum[self._fixed] = (2 * found.momentum - motion.P)[self._fixed]
         else:
             momentum = problem.momentum + problem.tau * force
             momentum[self._fixed] = found.momentum[self._fixed]
+        time, lost = _later(motion, h)
         return replace(
-            motion, time=motion.time + h, Q=end, P=momentum, V=v, kinetic=found.energy, potential=self.system.energy(q), h=h,
+            motion, time=time, lost=lost, Q=end, P=momentum, V=v, kinetic=found.energy, potential=potential, h=h,
             Q_before=motion.Q, P_before=motion.P, steps=motion.steps + 1,
         )  # fmt: skip
 
     def run(self, motion: Motion, until: float, h: float, tolerance: float | None = None) -> Iterator[Motion]:
-        """States up to a time, by steps of h, or by adapted ones that start with h.
+        """States up to a time, by steps of h, or by adapted ones that start with h; the last one ends at that time.
 
         Parameters
         ----------
         tolerance
             Greatest error of a step in any unknown, m. The error is estimated by making each step in two halves as well.
+
+        Raises
+        ------
+        NotConverged
+            As ``step``; what was yielded before stays good, to save or to go on from with smaller steps.
         """
-        begin, done = motion.time, 0
-        while motion.time < until - 1e-9 * h:
-            if tolerance is None:
-                motion = replace(self.step(motion, h), time=begin + (done + 1) * h)
-                done += 1
-            else:
+        _positive(h=h, **({} if tolerance is None else {"tolerance": tolerance}))
+        if not np.isfinite(until):
+            raise InputError(f"until = {until!r} must be a time in seconds")
+        while (left := (until - motion.time) - motion.lost) > NEARLY * h:
+            if tolerance is not None:
                 wanted = motion.next or h
-                motion = self._adapted(motion, min(wanted, until - motion.time), wanted, tolerance)
-            yield motion
+                parts = np.ceil(left / wanted * (1 - NEARLY))  # equal ones to the end, so that none is tiny
+                last, motion = parts <= 1, self._adapted(motion, left / max(parts, 1), wanted, tolerance)
+                last &= motion.time > until - NEARLY * h
+            else:
+                last = left <= h * (1 + NEARLY)
+                motion = self.step(motion, left if left < h * (1 - NEARLY) else h)
+            yield replace(motion, time=until, lost=0.0) if last else motion
 
     # -- how
-
-    @property
-    def _fixed(self) -> Array:
-        fixed = np.ones(self.system.size, bool)
-        fixed[self.system.active] = False
-        return fixed
 
     def _increment(self, motion: Motion, h: float) -> Increment:
         Q, P = motion.Q, motion.P
@@ -190,43 +217,91 @@ class Dynamics:
         if self.scheme == "implicit_euler" or motion.h == 0:
             return Increment(self.inertia, nothing, 1.0, Q, h, P)
         ratio = h / motion.h
-        one, two = (1 + ratio) ** 2 / (1 + 2 * ratio), ratio**2 / (1 + 2 * ratio)
-        back, momentum = one * Q - two * motion.Q_before, one * P - two * motion.P_before
+        share = ratio**2 / (1 + 2 * ratio)
+        back, momentum = Q + share * (Q - motion.Q_before), P + share * (P - motion.P_before)
         return Increment(self.inertia, nothing, 1.0, back, h * (1 + ratio) / (1 + 2 * ratio), momentum)
 
-    def _solve(self, problem: Increment, start: Array) -> Array:
-        self.inertia.bind(start)
-        if self.inertia.constant:
-            return minimise(problem, start, self._symmetric(problem), **self.options).Q
-        if self.solver is None:
-            self.solver = SuperLU(problem.nodes, problem.coordinates)
-        return problem.solve(start, self.solver)
+    def _end(self, problem: Increment, motion: Motion, h: float) -> Array:
+        start = motion.Q + h * motion.V
+        start[self._fixed] = motion.Q[self._fixed]
+        if self.held is not None:
+            moved = start.copy()
+            self.held(_later(motion, h)[0], moved)
+            start[self._fixed] = moved[self._fixed]
+        try:
+            return self._solve(problem, start, motion)
+        except ElementError:  # the velocity leads out of the domain
+            active = self.system.active
+            start[active] = motion.Q[active]
+            return self._solve(problem, start, motion)
+
+    def _solve(self, problem: Increment, start: Array, motion: Motion) -> Array:
+        if self.inertia.bind(start, motion.Q, motion.Q_before):
+            return minimise(problem, start, self.solver or self._symmetric(problem), **self.options).Q
+        if "any" not in self._own:
+            self._own["any"] = SuperLU(problem.nodes, problem.coordinates)
+        return problem.solve(start, self.solver or self._own["any"])
 
     def _symmetric(self, problem: Increment) -> Solver:
-        if self.solver is None:
-            from yarnverify.simulation.search import solver_for
-
-            self.solver = solver_for(problem, self.inertia.active_mass)
-        return self.solver
+        if "symmetric" not in self._own:
+            self._own["symmetric"] = solver_for(problem, self.inertia.active_mass)
+        return self._own["symmetric"]
 
     def _adapted(self, motion: Motion, h: float, wanted: float, tolerance: float) -> Motion:
         """A step of at most h whose estimated error is within the tolerance; what it returns was made in two halves."""
-        order = ORDERS[self.scheme]
-        rejected = motion.rejected
+        order, rejected = ORDERS[self.scheme], motion.rejected
+        failed: NotConverged | None = None
+        if self.scheme == "bdf2" and motion.h == 0:
+            order = 1  # as it starts
         for _ in range(40):
             try:
                 whole = self.step(motion, h)
                 twice = self.step(self.step(motion, h / 2), h / 2)
-            except (NotConverged, ElementError, LinearSolveError):
+            except NotConverged as error:
+                failed = error
                 h /= 4
                 wanted, rejected = h, rejected + 1
                 continue
             active = self.system.active
-            error = float(np.abs(whole.Q - twice.Q)[active].max(initial=0.0)) / (2**order - 1)
-            factor = 0.9 * (tolerance / error) ** (1 / (order + 1)) if error > 0 else 2.0
-            if error <= tolerance:
+            apart = float(np.abs(whole.Q - twice.Q)[active].max(initial=0.0))
+            found = _share(self.scheme, h, motion.h) * apart
+            factor = 0.9 * (tolerance / found) ** (1 / (order + 1)) if found > 0 else 2.0
+            if found <= tolerance:
                 following = max(wanted if h < wanted else 0.0, h * min(max(factor, 0.3), 2.0))
-                return replace(twice, time=motion.time + h, next=following, rejected=rejected, error=error)
+                return replace(twice, next=following, rejected=rejected, error=found)
             h *= min(max(factor, 0.1), 0.7)
             wanted, rejected = h, rejected + 1
-        raise NotConverged(f"no step from time {motion.time:g} s is accurate enough", motion.Q, [], None)
+        reason = f"no step from time {motion.time:.6g} s down to {h:.2g} s has an error below {tolerance:g} m"
+        history, worst = (failed.history, failed.worst) if failed else ([], None)
+        raise NotConverged(reason, motion.Q, history, worst) from failed
+
+
+def _later(motion: Motion, h: float) -> tuple[float, float]:
+    """Time after a step and what rounding takes from it (compensated summation)."""
+    step = h + motion.lost
+    time = motion.time + step
+    return time, step - (time - motion.time)
+
+
+def _share(scheme: Scheme, h: float, before: float) -> float:
+    """Error of a step made in two halves, over its distance from the step made at once.
+
+    ``1/(2^p - 1)`` for a scheme that looks at one state; for BDF2 from the leading errors, whose size depends on the step
+    before and of which it carries 4/3 of the first half's through the second.
+    """
+    if scheme != "bdf2":
+        return 1.0 / (2 ** ORDERS[scheme] - 1)
+    if before == 0:  # implicit Euler has h^2/2 at once and 4/3 (h/2)^2/2 at the end of the second half
+        return 0.5
+
+    def leading(h: float, before: float) -> float:
+        return h * h * (h + before) * (h + before) / (before + 2 * h)
+
+    twice = 4 / 3 * leading(h / 2, before) + leading(h / 2, h / 2)
+    return twice / (leading(h, before) - twice)
+
+
+def _positive(**values: float) -> None:
+    for name, value in values.items():
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(f"{name} = {value!r} must be positive")

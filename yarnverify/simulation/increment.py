@@ -114,7 +114,8 @@ class Increment:
         NotConverged
             No solution after so many iterations, or no step possible.
         """
-        system, history = self.inertia.system, []
+        system = self.inertia.system
+        history: list[Iteration] = []
         solver = solver or SuperLU(self.nodes, self.coordinates)
         best, last = Q, np.inf
         for _ in range(iterations):

@@ -47,16 +47,16 @@ class Inertia:
         Whose pattern and unknowns it shares.
     term
         Kinetic kernel and table: coordinates, then their rates.
-    moving
-        Whether sliding coordinates that are held are moved by the caller.
     """
 
-    def __init__(self, system: System, term: Term, moving: bool = False) -> None:
+    def __init__(self, system: System, term: Term) -> None:
         self.system, self.term, self.half = system, term, _half(term)
         self._places = system.pattern.places[len(system.terms)]
         rows = term.table.rows[: self.half]
         slides = [k for k, label in enumerate(term.kernel.DOFS[: self.half]) if "." not in label]
-        self.constant = not moving and not (system.pattern.local[rows[slides]] >= 0).any()
+        self._slides = rows[slides]
+        self._sliding = bool((system.pattern.local[self._slides] >= 0).any())
+        self._key = b""
 
     def _run(self, wanted: str, q: Array, part: slice) -> list[Array]:
         term = self.term
@@ -116,15 +116,20 @@ class Inertia:
         data, row, column = (np.concatenate(parts) for parts in zip(*found, strict=True))
         return sparse.coo_array((data, (row, column)), shape=(size, size)).tocsr()
 
-    def bind(self, Q: Array) -> None:
-        """Take the sliding coordinates of a configuration as those of the constant mass matrix."""
-        rows = self.term.table.rows[: self.half]
-        slides = [k for k, label in enumerate(self.term.kernel.DOFS[: self.half]) if "." not in label]
-        key = Q[rows[slides]].tobytes() if self.constant else b""
-        if key != getattr(self, "_key", None):
+    def bind(self, Q: Array, *others: Array) -> bool:
+        """Whether the mass matrix is constant: no sliding coordinate is unknown, or differs between configurations.
+
+        If so, ``mass`` and ``active_mass`` are those of Q from here on.
+        """
+        rest = Q[self._slides]
+        if self._sliding or any((other[self._slides] != rest).any() for other in others):
+            return False
+        key = rest.tobytes()
+        if key != self._key:
             self._key, self._rest = key, Q.copy()
             self.__dict__.pop("mass", None)
             self.__dict__.pop("active_mass", None)
+        return True
 
     @cached_property
     def active_mass(self) -> sparse.csc_array:

@@ -15,7 +15,10 @@ from numpy.typing import NDArray
 from yarnverify.kernels import ElementError
 from yarnverify.simulation.assembly import System
 from yarnverify.simulation.linear import LinearSolveError, Solver
-from yarnverify.simulation.search import Equilibrium, Iteration, NotConverged, Options, Problem, Search, solver_for
+from yarnverify.simulation.outcome import Equilibrium, Iteration, NotConverged, Options
+from yarnverify.simulation.problem import Problem
+from yarnverify.simulation.search import Search
+from yarnverify.simulation.steps import Steps, solver_for
 
 __all__ = ["Equilibrium", "Iteration", "NotConverged", "Options", "Problem", "minimise", "solver_for", "stages"]
 
@@ -53,7 +56,7 @@ def minimise(
     limits = Options(**options)
     start = np.array(Q, float)
     softness = problem.softness(start)
-    first = Search(problem, start, solver, report, limits, returns=1000 if softness > 0.1 else 1)
+    first = Search(Steps(problem, solver), start, report, limits, returns=1000 if softness > 0.1 else 1)
     try:
         return first.run()
     except NotConverged as error:
@@ -71,9 +74,10 @@ def _stiffened(first: Search, error: NotConverged, softness: float) -> Equilibri
     Q = error.Q
     found = None
     for factor in [*np.geomspace(softness, 1.0, count + 1)]:
-        problem = first.problem if factor == 1 else first.problem.softened(factor)
-        stage = Search(problem, Q, first.solver, first.report, first.options, searching=0 if found else 15)
-        stage.history, stage.seconds, stage.departures = first.history, first.seconds, first.departures
+        problem = first.steps.problem
+        steps = Steps(problem if factor == 1 else problem.softened(factor), first.steps.solver, first.steps.seconds)
+        stage = Search(steps, Q, first.report, first.options, searching=0 if found else 15)
+        stage.history, stage.departures = first.history, first.departures
         found = stage.run()
         first.departures = stage.departures
         Q = found.Q

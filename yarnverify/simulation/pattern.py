@@ -64,7 +64,7 @@ class Pattern:
         self.local = np.full(size, -1, np.int32)  # place of each entry of the configuration among the unknowns
         self.local[active] = np.arange(self.count, dtype=np.int32)
         block = _blocks(size, active, tables)
-        self._block = np.full(size, -1, np.int32)
+        self._block: Array = np.full(size, -1, np.int32)
         of_unknown = block[active]
         starts = np.flatnonzero(np.diff(of_unknown, prepend=-1))
         self._first = starts.astype(np.int32)  # first unknown of each block
@@ -109,18 +109,18 @@ class Pattern:
         columns = np.repeat(self._first[self.graph.indices], self._widths) + inside
         length = np.diff(self._row_pointer)[number]
         pointer = np.concatenate([[0], np.cumsum(length)])
-        kind = np.int32 if pointer[-1] < 2**31 else np.int64
+        kind: Any = np.int32 if pointer[-1] < 2**31 else np.int64
         self.indptr = pointer.astype(kind)
         shift = (self._row_pointer[number] - pointer[:-1]).astype(kind)
         self.indices = columns[np.repeat(shift, length) + np.arange(pointer[-1], dtype=kind)].astype(np.int32)
         rows = np.repeat(np.arange(self.count, dtype=np.int32), length)
-        above = self.indices >= rows
+        above: NDArray[np.bool_] = self.indices >= rows
         del rows
         number_above = np.add.reduceat(above, self.indptr[:-1], dtype=kind) if self.count else np.empty(0, kind)
         self._upper = np.concatenate([[0], np.cumsum(number_above)]).astype(kind)
         self.sums = int(self._upper[-1])
         self._diagonal = (self.indptr[1:] - number_above).astype(kind)  # where the diagonal stands in each row
-        source = np.empty(int(pointer[-1]), kind)
+        source: NDArray[np.integer[Any]] = np.empty(int(pointer[-1]), kind)
         source[above] = np.arange(self.sums, dtype=kind)
         shape = (self.count, self.count)
         other = sparse.csr_array((np.arange(pointer[-1], dtype=kind), self.indices, self.indptr), shape=shape).T.tocsr()

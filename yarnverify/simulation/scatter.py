@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from yarnverify.errors import NotRunError
 
 Array = NDArray[Any]
 Add = Callable[[Array, Array, Array, Array], None]
@@ -25,10 +28,13 @@ def compiled() -> Add:
 
     Raises
     ------
-    ModuleNotFoundError
+    NotRunError
         Without numba.
     """
-    from numba import njit
+    try:
+        njit = importlib.import_module("numba").njit
+    except ImportError:
+        raise NotRunError("the engine 'compiled' needs numba: pip install 'yarnverify[compiled]'") from None
 
     @njit(cache=True, nogil=True)
     def loop(sums, at, values, rows):  # type: ignore[no-untyped-def]

@@ -6,8 +6,8 @@ Notation: e edge, l its length, d its direction, D a difference of sliding coord
   compressed, is taken to be zero. The two parts act on orthogonal subspaces, so this is the exact projection.
 * Bending and shear are functions of an angle between two directions a, b. Out of the plane of a and b, where they move by p
   and q, the Hessian of an angle theta is ``cot(theta) (p^2 + q^2) - 2 p q/sin(theta)``, that is
-  ``cot(theta/2) t^2 - tan(theta/2) s^2`` with ``t, s = (p -+ q)/sqrt(2)``: one square of either sign. The positive one is
-  kept, exactly. In the plane the Gauss-Newton part is kept: ``theta^2/D`` is convex in (theta, D), and so is psi^2.
+  ``cot(theta/2) t^2 - tan(theta/2) s^2`` with ``t, s = (p -+ q)/sqrt(2)``: one square of either sign. The negative one is
+  left out. In the plane the Gauss-Newton part is kept: ``theta^2/D`` is convex in (theta, D), and so is psi^2.
   At theta = 0 the two squares together become ``|da - db|^2``, which has no direction, so any normal will do there.
 * Parallel contact is a square: nothing to do. Whatever else: eigenvalues of each element's Hessian.
 

@@ -10,7 +10,6 @@ import hashlib
 import json
 import os
 import tempfile
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -51,10 +50,15 @@ def save(path: str | os.PathLike[str], *, identity: str = "", **arrays: ArrayLik
     """
     path = Path(path)
     temporary = None
+    named: dict[str, Any] = {"format": np.array(FORMAT), "identity": np.array(identity)}
+    named |= {name: np.asarray(values) for name, values in arrays.items()}
+    for name, values in named.items():
+        if values.dtype.hasobject:
+            raise TypeError(f"the state {name} cannot be saved: {values.dtype} is not an array of numbers")
     try:
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
             temporary = Path(file.name)
-            np.savez(file, **{"format": FORMAT, "identity": identity, **arrays})
+            np.savez(file, **named)
             file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, path)
@@ -89,13 +93,17 @@ def load(path: str | os.PathLike[str], identity: str = "") -> dict[str, Array]:
         There is no such file, it is damaged, or it belongs to another run.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with (
+            Path(path).open("rb") as stream,
+            np.load(stream, allow_pickle=False) as file,
+        ):  # an npy file gives an array, which is no such thing
             found = {name: file[name] for name in file.files}
         version, known = int(found.pop("format")), str(found.pop("identity"))
     except FileNotFoundError:
         raise InputError(f"there is no saved state {path}") from None
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path} is not a complete saved state: {error}") from None
+    except Exception as error:  # whatever a damaged file makes its readers raise, and they are many
+        reason = str(error).partition("\n")[0] or type(error).__name__
+        raise InputError(f"{path} is not a complete saved state: {reason}") from None
     if version != FORMAT:
         raise InputError(f"{path} was saved in format {version}; this version reads format {FORMAT}")
     if identity and known != identity:

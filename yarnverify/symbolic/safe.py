@@ -32,7 +32,7 @@ from yarnverify.symbolic.measures import Measure, NoMeasuresError, Segment, diff
 from yarnverify.symbolic.scalars import scalar_tree
 from yarnverify.symbolic.tree import FORCE, IDENTITY, PI, ZERO, Expr, Name, number
 
-_ATOMS = ("C", "S", "s", "A", "f", "g", "versine", "half", "psi")  # scalars of a corner
+_ATOMS = ("C", "S", "s", "A", "f", "g", "versine", "vercosine", "half", "psi")  # scalars of a corner
 Shape = Literal["smooth", "polar"]
 
 
@@ -353,12 +353,13 @@ def _shape(derivation: Derivation, corner: Corner | None, shape: Shape) -> Safe:
     if shape == "smooth":
         c = sp.Symbol("cosine", real=True)
         law = _in_cosine(derivation.law, theta, c)
+        whole = {1 - c: atoms["versine"], c - 1: -atoms["versine"], 1 + c: atoms["vercosine"]}  # none of them cancels
 
         def settled(value: Any) -> Any:
             value = value.subs(theta_squared(c), atoms["A"])
             value = value.subs({theta_over_sine(c): atoms["f"]})
             value = value.replace(lambda e: e.is_Function and e.func.__name__ == "sine_excess", lambda e: atoms["g"])
-            value = sp.factor(value).subs(1 - c, atoms["versine"]).subs(c - 1, -atoms["versine"])
+            value = sp.factor(value).replace(lambda e: e in whole, lambda e: whole[e])
             return value.subs(c, corner.sign * atoms["C"])
 
         second = _in_cosine(sp.diff(derivation.law, theta, 2), theta, c)
@@ -470,6 +471,7 @@ def _section(derivation: Derivation, corner: Corner | None) -> Section:
         "f": theta / sine,
         "g": (sine - theta * cosine) / sine**3,
         "versine": number(1) - cosine,
+        "vercosine": number(1) + cosine,
         "half": Expr("call", (theta / 2,), "tan"),
         "psi": theta - PI / 2,
     }.items():

@@ -206,7 +206,9 @@ def _corner_lines(safe: Safe, corner: Corner, digits: Digits, used: set[str]) ->
     lines += [_unpacked(name) for name in (a.d.name, b.d.name)]
     lines.append(f"{vector('v')}, {vector('k')} = closing({a.tail.label}, {ends})")
     lines += [_unpacked(corner.name(base, bold=True)) for base in ("v", "k")]
-    cosine = atom("C") if corner.sign > 0 else f"-{atom('C')}"
+    cosine, opposite = atom("C"), f"-{atom('C')}"
+    if corner.sign < 0:
+        cosine, opposite = opposite, cosine
     if safe.shape == "smooth":
         lines.append(f"{vector('m')} = scaled({vector('normal')}, {atom('scale')})")
         lines.append(_unpacked(corner.name("m", bold=True)))
@@ -214,6 +216,8 @@ def _corner_lines(safe: Safe, corner: Corner, digits: Digits, used: set[str]) ->
         lines.append(f"{atom('A')}, {atom('f')}, {atom('g')} = turning({atom('S')}, {cosine})")
         if atom("versine") in used:
             lines.append(f"{atom('versine')} = versine({atom('S')}, {cosine})")
+        if atom("vercosine") in used:
+            lines.append(f"{atom('vercosine')} = versine({atom('S')}, {opposite})")
         return lines
     lines.append(f"{vector('n')}, {atom('size')} = normal_of({vector('normal')})")
     lines.append(f"{atom('s')} = {atom('size')}*{atom('scale')}")

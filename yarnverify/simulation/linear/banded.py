@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from yarnverify.simulation.linear.protocol import LinearSolveError, checked
+from yarnverify.simulation.linear.protocol import LinearSolveError, checked, pattern_of, same_pattern
 from yarnverify.simulation.linear.superlu import SuperLU
 
 Array = NDArray[Any]
@@ -19,18 +19,19 @@ class Banded:
 
     def __init__(self) -> None:
         self._shape: tuple[Array, Array] | None = None
-        self._width = self._entries = 0
+        self._width = 0
+        self._known: Any = None
         self._other = SuperLU()
 
     def factorise(self, matrix: Any) -> Any:
         """Factorise a symmetric sparse matrix."""
-        if self._shape is None or self._entries != matrix.nnz:
+        if self._shape is None or not same_pattern(matrix, self._known):
             column = np.repeat(np.arange(matrix.shape[1]), np.diff(matrix.indptr))
             below = np.flatnonzero(matrix.indices >= column)
             row, column = matrix.indices[below] - column[below], column[below]
             self._width = int(row.max(initial=0))
             self._shape = (below, column * (self._width + 1) + row)
-            self._entries = matrix.nnz
+            self._known = pattern_of(matrix)
         below, place = self._shape
         band = np.zeros((matrix.shape[1], self._width + 1))
         band.reshape(-1)[place] = matrix.data[below]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from yarnverify.simulation.linear.protocol import LinearSolveError
+from yarnverify.simulation.linear.protocol import LinearSolveError, pattern_of, same_pattern
 from yarnverify.simulation.linear.threads import one_thread
 
 Array = NDArray[Any]
@@ -51,7 +51,7 @@ class ConjugateGradients:
     def __init__(self, lines: Sequence[Array], tolerance: float = 1e-10, iterations: int = 5000) -> None:
         self.lines, self.tolerance, self.iterations = list(lines), tolerance, iterations
         self._bands: list[tuple[int, Array, Array]] | None = None
-        self._entries = 0
+        self._known: Any = None
 
     @one_thread()
     def factorise(self, matrix: Any) -> Gradients:
@@ -62,9 +62,11 @@ class ConjugateGradients:
         LinearSolveError
             A block is not positive definite.
         """
-        if self._bands is None or self._entries != matrix.nnz:
+        if self._bands is None or not same_pattern(matrix, self._known):
+            if np.unique(np.concatenate([np.empty(0, np.int64), *self.lines])).size != matrix.shape[0]:
+                raise ValueError("conjugate gradients: an unknown lies on no line")
             self._bands = [_band(matrix, line) for line in self.lines]
-            self._entries = matrix.nnz
+            self._known = pattern_of(matrix)
         factors = []
         for line, (width, source, target) in zip(self.lines, self._bands, strict=True):
             band = np.zeros((line.size, width + 1))
@@ -142,7 +144,8 @@ class Gradients:
             image = self._matrix @ direction
             curvature = _sum(direction, image)
             if not curvature > 0:
-                raise LinearSolveError("conjugate gradients: the matrix is not positive definite", direction)
+                found = direction if curvature < 0 else None
+                raise LinearSolveError("conjugate gradients: the matrix is not positive definite", found)
             step = product / curvature
             x += step * direction
             residual -= step * image

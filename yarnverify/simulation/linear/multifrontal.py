@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 
 from yarnverify.simulation.linear.ordering import Dissection, dissect
-from yarnverify.simulation.linear.protocol import LinearSolveError, checked
+from yarnverify.simulation.linear.protocol import LinearSolveError, checked, pattern_of, same_pattern
 from yarnverify.simulation.linear.superlu import node_graph
 from yarnverify.simulation.linear.threads import one_thread
 
@@ -63,7 +63,7 @@ class Multifrontal:
     def __init__(self, nodes: Array | None = None, coordinates: Array | None = None, leaf: int = 40) -> None:
         self._nodes, self._coordinates, self._leaf = nodes, coordinates, leaf
         self._fronts: list[_Front] | None = None
-        self._entries = 0
+        self._known: Any = None
 
     @one_thread()
     def factorise(self, matrix: Any) -> MultifrontalFactor:
@@ -74,7 +74,7 @@ class Multifrontal:
         LinearSolveError
             A group is exactly singular.
         """
-        if self._fronts is None or self._entries != matrix.nnz:
+        if self._fronts is None or not same_pattern(matrix, self._known):
             self._analyse(matrix)
         assert self._fronts is not None
         rest: list[list[tuple[_Front, Array]]] = [[] for _ in self._fronts]
@@ -88,7 +88,8 @@ class Multifrontal:
             for child, part in rest[number]:
                 _extend(own, below, left, child.runs, part)
             rest[number] = []
-            eliminated, left = _eliminate(own, below, left)
+            with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is found when solving
+                eliminated, left = _eliminate(own, below, left)
             done.append(eliminated)
             if s:
                 rest[front.parent].append((front, left))
@@ -115,7 +116,7 @@ class Multifrontal:
         pointer = np.searchsorted(column[lower], np.arange(n + 1))
         entries = (lower, row[lower], column[lower], pointer)
         self._fronts = list(_fronts(tree, graph, rank, start, entries))
-        self._entries = matrix.nnz
+        self._known = pattern_of(matrix)
 
 
 def _fronts(tree: Dissection, graph: Any, rank: Array, start: Array, entries: Any) -> Iterator[_Front]:
@@ -222,7 +223,8 @@ class MultifrontalFactor:
     @one_thread()
     def solve(self, b: Array) -> Array:
         """The solution, residual checked."""
-        return checked(self._matrix, b, self._raw(b), self._raw, "multifrontal")
+        with np.errstate(over="ignore", invalid="ignore"):
+            return checked(self._matrix, b, self._raw(b), self._raw, "multifrontal")
 
     def _raw(self, b: Array) -> Array:
         x = b[self._order]

@@ -39,6 +39,8 @@ class Dissection:
 
 def coordinates_of(graph: sparse.csr_array) -> Array:
     """A coordinate for graphs that have none: the reverse Cuthill-McKee number, which grows along the graph."""
+    if not graph.shape[0]:
+        return np.empty((0, 1))
     order = reverse_cuthill_mckee(sparse.csr_matrix(graph), symmetric_mode=True)
     place = np.empty(len(order))
     place[order] = np.arange(len(order))

@@ -6,6 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 Array = NDArray[Any]
 TOLERANCE = 1e-9  # of a residual, relative to |A| |x| + |b|
@@ -38,6 +39,20 @@ class Solver(Protocol):
 
     def factorise(self, matrix: Any) -> Factor:
         """The factor of a sparse matrix (n, n)."""
+
+
+def same_pattern(matrix: Any, known: Any) -> bool:
+    """Whether two sparse matrices store the same entries; ``known`` may be None."""
+    if known is None or matrix.nnz != known.nnz or matrix.shape != known.shape:
+        return False
+    pairs = ((matrix.indptr, known.indptr), (matrix.indices, known.indices))
+    return all(a is b or np.array_equal(a, b) for a, b in pairs)
+
+
+def pattern_of(matrix: Any) -> sparse.csc_array:
+    """A sparse matrix without its values, to compare with."""
+    nothing = np.broadcast_to(np.zeros(1, np.int8), matrix.indices.shape)
+    return sparse.csc_array((nothing, matrix.indices, matrix.indptr), shape=matrix.shape, copy=False)
 
 
 def checked(matrix: Any, b: Array, x: Array, again: Any, name: str, tolerance: float = TOLERANCE) -> Array:

@@ -12,7 +12,7 @@ from scipy import sparse
 from scipy.sparse.linalg import MatrixRankWarning, splu
 
 from yarnverify.simulation.linear.ordering import dissect
-from yarnverify.simulation.linear.protocol import LinearSolveError, checked
+from yarnverify.simulation.linear.protocol import LinearSolveError, checked, pattern_of, same_pattern
 
 Array = NDArray[Any]
 
@@ -31,6 +31,7 @@ class SuperLU:
     def __init__(self, nodes: Array | None = None, coordinates: Array | None = None) -> None:
         self._nodes, self._coordinates = nodes, coordinates
         self._order: Array | None = None
+        self._known: Any = None
 
     def factorise(self, matrix: Any) -> SuperFactor:
         """Factorise a square sparse matrix.
@@ -41,7 +42,8 @@ class SuperLU:
             The matrix is exactly singular, or memory does not suffice.
         """
         matrix = sparse.csc_array(matrix)
-        if self._nodes is not None and self._order is None:
+        if self._nodes is not None and not same_pattern(matrix, self._known):
+            self._known = pattern_of(matrix)
             self._order = np.argsort(ranks(matrix, self._nodes, self._coordinates), kind="stable")
         order = self._order
         options = {"SymmetricMode": True}

@@ -1,0 +1,185 @@
+"""One run of a problem, step by step, from the start or from a saved state to the same end.
+
+run = Run(problem)
+for reached in run.go(): ...      arrays = reached.arrays() can be saved; run.go(arrays) goes on from there
+run.outcome(arrays)               what answers are read from
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from yarnverify.simulation.assembly import System
+from yarnverify.simulation.dynamics import Dynamics, Motion
+from yarnverify.simulation.linear import Solver, SuperLU
+from yarnverify.simulation.newton import stages
+from yarnverify.simulation.setting import Moving, Outcome, Setting, Static
+
+Array = NDArray[Any]
+State = Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """How far a run has come.
+
+    Attributes
+    ----------
+    time
+        s, or stages.
+    Q
+        Configuration, (size,), m.
+    arrays
+        Makes all that is needed to go on from here, or to end here.
+    frame
+        Whether it is one to draw.
+    """
+
+    time: float
+    Q: Array
+    arrays: Callable[[], dict[str, Any]]
+    frame: bool = True
+
+
+@dataclass(eq=False)
+class Run:
+    """A problem and what solves it.
+
+    Attributes
+    ----------
+    problem
+        What is run.
+    solver
+        ``direct`` or ``superlu``.
+    report
+        Called with a line on what goes on, now and then.
+    """
+
+    problem: Setting
+    solver: str = "direct"
+    report: Callable[[str], None] | None = None
+    _dynamics: Dynamics | None = field(init=False, default=None)
+
+    def __post_init__(self) -> None:
+        p = self.problem
+        start = np.array(p.fabric.Q if p.start is None else p.start, float)
+        if start.shape != (p.fabric.size,):
+            raise ValueError(f"the start must have shape ({p.fabric.size},), not {start.shape}")
+        self.start = start
+        if isinstance(p, Moving):
+            self._dynamics = Dynamics(p.fabric.Q, p.terms, p.active, p.kinetic, p.loads, scheme=p.scheme, held=p.held,
+                                      solver=None, **p.options)  # fmt: skip
+            self.system = self._dynamics.system
+            self._dynamics.solver = self._linear(None)
+        else:
+            self.system = System(p.fabric.Q, p.terms, p.active)
+        self._names = ["time", *p.watch]
+
+    @property
+    def length(self) -> float:
+        """Stages, or seconds of time."""
+        return self.problem.until if isinstance(self.problem, Moving) else float(len(self.problem.stages))
+
+    @property
+    def moving(self) -> bool:
+        """Whether time goes on, rather than stages."""
+        return isinstance(self.problem, Moving)
+
+    def outcome(self, state: State) -> Outcome:
+        """What a state has come to."""
+        recorded = {name: np.asarray(state[f"recorded {name}"], float) for name in self._names}
+        motion = Motion.of(state) if self.moving else None
+        return Outcome(self.problem.fabric, np.asarray(state["Q"], float), self.system, recorded, motion)
+
+    def go(self, state: State | None = None) -> Iterator[Reached]:
+        """States after each stage or step, from a state on or from the start.
+
+        Raises
+        ------
+        NotConverged, ElementError, LinearSolveError
+            A stage or step cannot be solved.
+        """
+        yield from self._move(state) if self.moving else self._rest(state)
+
+    # -- how
+
+    def _linear(self, default: Solver | None) -> Solver | None:
+        return SuperLU(self.system.nodes, self.system.coordinates) if self.solver == "superlu" else default
+
+    def _watched(self, time: float, Q: Array, motion: Motion | None) -> list[float]:
+        seen = Outcome(self.problem.fabric, Q, self.system, {}, motion)
+        return [time, *(float(value(seen)) for value in self.problem.watch.values())]
+
+    def _rest(self, state: State | None) -> Iterator[Reached]:
+        p = self.problem
+        assert isinstance(p, Static)
+        done, iterations = (int(state["stage"]), int(state["iterations"])) if state else (0, 0)
+        Q = np.array(state["Q"], float) if state else self.start
+        records = _Records(self._names, state)
+        solver = self._linear(None)
+        for stage in p.stages[:done]:  # loads that a stage leaves are those of the one before
+            self.system.loads = self.system.loads if stage.loads is None else np.array(stage.loads, float)
+        for number, stage in list(enumerate(p.stages))[done:]:
+            for found in stages(
+                self.system, Q, [stage.loads], [stage.held], solver, report=self._tell(number), **p.options
+            ):
+                Q, iterations = found.Q, iterations + found.iterations
+            records.add(self._watched(number + 1.0, Q, None))
+            counts = {"stage": number + 1, "iterations": iterations}
+            yield Reached(number + 1.0, Q, partial(_together, {"Q": Q, **counts}, records))
+
+    def _tell(self, number: int) -> Callable[[Any], None] | None:
+        if self.report is None:
+            return None
+        report, of = self.report, f"stage {number + 1} of {int(self.length)}, " if self.length > 1 else ""
+        return lambda line: report(f"{of}residual {line.residual:.0e} N")
+
+    def _move(self, state: State | None) -> Iterator[Reached]:
+        p, dynamics = self.problem, self._dynamics
+        assert isinstance(p, Moving) and dynamics is not None
+        if state:
+            motion, frames = Motion.of(state), list(np.asarray(state["frames"], float))
+            times = [float(t) for t in state["frame times"]]
+        else:
+            motion = dynamics.start(self.start, p.V)
+            frames, times = [motion.Q], [0.0]
+        records = _Records(self._names, state)
+        if not state:
+            records.add(self._watched(0.0, motion.Q, motion))
+        for after in dynamics.run(motion, p.until, p.h, p.tolerance):
+            frame = int(after.time / p.until * p.frames + 1e-9) > int(motion.time / p.until * p.frames + 1e-9)
+            if frame:
+                frames.append(after.Q)
+                times.append(after.time)
+            motion = after
+            records.add(self._watched(motion.time, motion.Q, motion))
+            yield Reached(motion.time, motion.Q, partial(_moving, motion, records, frames, times), frame)
+
+
+class _Records:
+    """What is watched, growing."""
+
+    def __init__(self, names: list[str], state: State | None) -> None:
+        self.values = {name: list(np.asarray(state[f"recorded {name}"], float)) if state else [] for name in names}
+
+    def add(self, row: list[float]) -> None:
+        for column, value in zip(self.values.values(), row, strict=True):
+            column.append(value)
+
+    def arrays(self) -> dict[str, Any]:
+        return {f"recorded {name}": np.array(column) for name, column in self.values.items()}
+
+
+def _together(own: State, records: _Records) -> dict[str, Any]:
+    return {**own, **records.arrays()}
+
+
+def _moving(motion: Motion, records: _Records, frames: list[Array], times: list[float]) -> dict[str, Any]:
+    own = {"frames": np.array(frames), "frame times": np.array(times), "iterations": motion.steps}
+    return {**motion.arrays(), **own, **records.arrays()}
