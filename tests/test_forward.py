@@ -85,7 +85,8 @@ def test_a_root_that_the_others_have_is_written_with_them() -> None:
     assert numbers.sqrt(5 + 2 * two * three) == two + three
     deep = numbers.sqrt(2 + two)  # sqrt(2 + sqrt 2) sqrt(2 - sqrt 2) = sqrt 2
     assert numbers.sqrt(2 - two) * deep == two
-    assert numbers.sqrt((1 + two + three + deep) ** 2) == 1 + two + three + deep
+    total = 1 + two + three + deep
+    assert numbers.sqrt(total * total) == total
 
 
 def test_numbers_without_a_value() -> None:
