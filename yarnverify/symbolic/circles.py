@@ -8,7 +8,6 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import flint
-from sympy import QQ
 
 from yarnverify.symbolic.enclosures import BITS, Place
 from yarnverify.symbolic.polynomials import Quotient
@@ -55,7 +54,7 @@ class Circles:
     def arccos(self, cosine: Quotient) -> Quotient:
         for exact, halves in ((0, 1), (1, 0), (-1, 2)):
             if (cosine - exact).is_zero:
-                return self.pi * self.field.constant(QQ(halves, 2))
+                return self.pi * self.field.constant(Fraction(halves, 2))
         for known, angle in self._angles:
             if (known - cosine).is_zero:
                 return angle
@@ -103,7 +102,7 @@ class Circles:
                 left = multiple(self._point_of(cosine), count, self._one)
                 if right is not None and all((a - b).is_zero for a, b in zip(left, right, strict=True)):
                     field.note(partial(holds, relation))
-                    angle = self.pi * self.field.constant(QQ(parts, PARTS_OF_PI))
+                    angle = self.pi * self.field.constant(Fraction(parts, PARTS_OF_PI))
                     for j, n in total.items():
                         angle = angle + field.relations.make(labels[j]) * n
                     return angle / count
@@ -114,9 +113,9 @@ class Circles:
     def point(self, angle: Quotient) -> Pair:
         """Sine and cosine, by the parts of the angle: multiples of pi, of arc cosines, and of anything else."""
         relations, total = self.field.relations, (self.field.constant(0), self._one)
-        for monomial, coefficient in angle.numerator.items():
-            term = relations.quotient(relations.ring.from_dict({monomial: QQ(1)}), angle.factors)
-            factor = Fraction(int(coefficient.numerator), int(coefficient.denominator))
+        for monomial, coefficient in relations.terms(angle.numerator):
+            term = relations.quotient(monomial, angle.factors)
+            factor = Fraction(int(coefficient.p), int(coefficient.q))
             total = turned(total, self._turn(term, factor))
         return total
 

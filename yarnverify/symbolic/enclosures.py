@@ -24,12 +24,16 @@ class Place:
         A value for every unknown and parameter.
     points
         The points in the field's order, its first one the base.
+    names
+        The generators, in their order.
     recipes
         How the generators are worked out that the field made on its way; it grows with the field.
     """
 
-    def __init__(self, state: Mapping[Name, Any], points: Sequence[Name], recipes: Mapping[str, Recipe]) -> None:
-        constant, self._recipes = Balls().constant, recipes
+    def __init__(
+        self, state: Mapping[Name, Any], points: Sequence[Name], names: Sequence[str], recipes: Mapping[str, Recipe]
+    ) -> None:
+        constant, self._names, self._recipes = Balls().constant, names, recipes
         self._known: dict[str, Any] = {str(n): constant(v) for n, v in state.items() if not n.bold}
         for name in points:
             here = [constant(part) for part in state[name]]
@@ -48,19 +52,18 @@ class Place:
         return self._known[label]
 
     def poly(self, poly: Poly) -> Any:
-        symbols = poly.ring.symbols
         total = flint.arb(0)
-        for monomial, coefficient in poly.items():
-            term = flint.arb(flint.fmpq(int(coefficient.numerator), int(coefficient.denominator)))
+        for monomial, coefficient in poly.to_dict().items():
+            term = flint.arb(coefficient)
             for i, power in enumerate(monomial):
                 if power:
-                    term = term * self.generator(symbols[i].name) ** power
+                    term = term * self.generator(self._names[i]) ** power
             total += term
         return total
 
     def quotient(self, value: Quotient) -> Any:
         total = self.poly(value.numerator)
-        for factor, power in value.factors:
+        for factor, power in value.below:
             total = total / self.poly(factor) ** power
         return total
 

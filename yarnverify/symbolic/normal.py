@@ -117,9 +117,9 @@ class Field(Reading):
         before = len(self.roots.squares)
         value = super().value(expr, blocks)
         if expr.op == "sqrt" and self._granted is not None:
-            self._granted += [p for p in self.roots.squares if (value * value).numerator == p]
+            self._granted += [p for p in self.roots.radicands() if (value * value).numerator == p]
         if expr.op == "norm":
-            self._not_negative += [*self.roots.squares][before:]
+            self._not_negative += self.roots.radicands()[before:]
         elif expr.op == "call" and expr.value == "arccos" and self._between_directions(expr.args[0]):
             cosine = super().value(expr.args[0], blocks)
             if not cosine.factors:
@@ -166,7 +166,7 @@ class Field(Reading):
 
     def place(self, state: State) -> Place:
         with flint.ctx.workprec(BITS):
-            return Place(state, self._points, self._recipes)
+            return Place(state, self._points, self.relations.names, self._recipes)
 
     @cached_property
     def places(self) -> list[Place]:
@@ -210,18 +210,18 @@ class Field(Reading):
 
     def sign(self, poly: Poly) -> int:
         """Sign of a polynomial as far as the assumptions settle it: 1, -1, or 0 for not known."""
-        signs = {self._sign_of_term(monomial, coefficient) for monomial, coefficient in poly.items()}
+        signs = {self._sign_of_term(monomial, coefficient) for monomial, coefficient in poly.to_dict().items()}
         if len(signs) == 1 and signs != {0}:
             return signs.pop()
         for known in (*self._known_positive, *self._not_negative, *(self._granted or ())):
-            ratio = poly.LC / known.LC
+            ratio = poly.leading_coefficient() / known.leading_coefficient()
             if poly == known * ratio:
                 return 1 if ratio > 0 else -1
         return 0
 
     def _sign_of_term(self, monomial: tuple[int, ...], coefficient: Any) -> int:
-        symbols = self.relations.ring.symbols
-        known = all(symbols[i].name in self._positive for i, e in enumerate(monomial) if e % 2)
+        names = self.relations.names
+        known = all(names[i] in self._positive for i, e in enumerate(monomial) if e % 2)
         return 0 if not known else 1 if coefficient > 0 else -1
 
     @cached_property

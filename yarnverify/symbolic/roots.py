@@ -6,6 +6,8 @@ from collections.abc import Iterable, Sequence
 from math import prod
 from typing import TYPE_CHECKING, Any
 
+import flint
+
 from yarnverify.symbolic.polynomials import Poly, Quotient, Relations, rational_root
 from yarnverify.symbolic.reading import UnsupportedError
 from yarnverify.symbolic.square_roots import known_root
@@ -23,14 +25,14 @@ class Roots:
     Attributes
     ----------
     squares
-        The generator of every root, by what stands under it.
+        The generator of every root, by what stands under it, as the relations list it.
     independent
         Whether no root is known to be, or might be, a quotient with the others.
     """
 
     def __init__(self, field: Field, labels: Sequence[str]) -> None:
         self.field, self.relations = field, field.relations
-        self.squares: dict[Poly, str] = {}
+        self.squares: dict[int, str] = {}
         self.independent = True
         self._directions = list(self.relations.squares)  # what makes directions unit vectors
         self._layers: list[str] = []  # independent roots
@@ -46,14 +48,14 @@ class Roots:
         result = self.relations.constant(1)
         content, parts = self.relations.factor(value.numerator)
         result = result * abs(content)
-        for part, power, invert in [(p, e, False) for p, e in parts] + [(p, e, True) for p, e in value.factors]:
+        for part, power, invert in [(p, e, False) for p, e in parts] + [(p, e, True) for p, e in value.below]:
             sign = self.field.sign(part) or self.field.sign_here(part)
             if sign:
                 one = Quotient(self.relations, part) * sign
             elif power % 2 == 0:
                 one, power = Quotient(self.relations, self.relations.reduce(part**2)), power // 2
             else:
-                one, self.independent = self._root(part**2), False
+                one, self.independent = self.relations.make(self._root(part**2)), False
             result = result * (one**-power if invert else one**power)
         return result
 
@@ -62,25 +64,26 @@ class Roots:
         if value.is_zero:
             return value
         content, parts = self.relations.factor(value.numerator)
-        return self._sqrt(content, parts, value.factors)
+        return self._sqrt(content, parts, value.below)
 
     def sine(self, cosine: Quotient) -> Quotient:
         """``sqrt(1 - c^2)`` by its factors ``1 - c`` and ``1 + c``, which the relations of directions would hide."""
         if not (1 - cosine * cosine).numerator:
             return self.relations.constant(0)
-        below = prod((factor**power for factor, power in cosine.factors), start=self.relations.ring(1))
-        content = self.relations.ring.domain.one
-        parts: list[tuple[Poly, int]] = []
+        below = prod((factor**power for factor, power in cosine.below), start=self.relations.number(1))
+        content: Any = flint.fmpq(1)
+        joined: dict[int, int] = {}
         for side in (below - cosine.numerator, below + cosine.numerator):
             of_side, factors = self.relations.factor(side)
-            content, parts = content * of_side, [*parts, *factors]
-        joined: dict[Poly, int] = {}
-        for part, power in parts:
-            joined[part] = joined.get(part, 0) + power
-        return self._sqrt(content, joined.items(), [(factor, 2 * power) for factor, power in cosine.factors])
+            content = content * of_side
+            for part, power in factors:
+                place = self.relations.listing(part)
+                joined[place] = joined.get(place, 0) + power
+        above = [(self.relations.listed[place], power) for place, power in joined.items()]
+        return self._sqrt(content, above, [(factor, 2 * power) for factor, power in cosine.below])
 
     def _sqrt(self, content: Any, above: Factors, below: Factors) -> Quotient:
-        outside, inside = self.relations.constant(1), self.relations.ring(1)
+        outside, inside = self.relations.constant(1), self.relations.number(1)
         for part, power, invert in [(p, e, False) for p, e in above] + [(p, e, True) for p, e in below]:
             whole, odd = divmod(power + (power % 2 if invert else 0), 2)
             if whole:
@@ -92,15 +95,12 @@ class Roots:
         reduced = self.relations.reduce(inside)
         if reduced == 1:
             return outside
-        if reduced not in self.squares:
+        if self.relations.listing(reduced) not in self.squares:
             known = self._known(inside, reduced)
             if known is not None:
                 return outside * self.absolute(known)
-        new = reduced not in self.squares
-        root = self._root(reduced)
-        if new:
-            self.layer(self.squares[reduced], inside)
-        return outside * root
+            self.layer(self._root(reduced), inside)
+        return outside * self.relations.make(self._root(reduced))
 
     def _known(self, inside: Poly, reduced: Poly) -> Quotient | None:
         """The root by others; first as if directions were any vectors, which is fast, and then with their relations."""
@@ -115,14 +115,19 @@ class Roots:
                 return None
             if found is not None:
                 top = Quotient(self.relations, self.relations.reduce(found.numerator))
-                for factor, power in found.factors:
+                for factor, power in found.below:
                     top = top / Quotient(self.relations, self.relations.reduce(factor)) ** power
                 return top
         return None
 
-    def _root(self, square: Poly) -> Quotient:
-        """A generator for the square root of a polynomial; for p^2 it is the absolute value of p."""
-        if square not in self.squares:
+    def radicands(self) -> list[Poly]:
+        """What stands under the roots, in the order in which they were met."""
+        return [self.relations.listed[place] for place in self.squares]
+
+    def _root(self, square: Poly) -> str:
+        """The generator that is the square root of a polynomial; of p^2 it is the absolute value of p."""
+        place = self.relations.listing(square)
+        if place not in self.squares:
             reduced = self.relations.reduce(square)
 
             def rule(unknown: Name, axis: int) -> Quotient:
@@ -130,5 +135,5 @@ class Roots:
                 return slope / (self.relations.make(label) * 2)
 
             label = self.field.atom(rule, lambda place: place.poly(reduced).sqrt(), reduced, positive=True)
-            self.squares[square] = label
-        return self.relations.make(self.squares[square])
+            self.squares[place] = label
+        return self.squares[place]

@@ -39,8 +39,8 @@ class Slopes:
         """Exact partial derivative by an unknown, or by one coordinate of a point."""
         result = self._poly_derivative(value.numerator, unknown, axis)
         if value.factors:
-            result = result * Quotient(self.relations, self.relations.ring(1), value.factors)
-        for factor, power in value.factors:
+            result = result * Quotient(self.relations, self.relations.number(1), value.factors)
+        for factor, power in value.below:
             result = result - value * self._poly_derivative(factor, unknown, axis) * power / Quotient(
                 self.relations, factor
             )
@@ -48,14 +48,10 @@ class Slopes:
 
     def _poly_derivative(self, poly: Poly, unknown: Name, axis: int) -> Quotient:
         total = self.relations.constant(0)
-        used = [i for i in range(self.relations.ring.ngens) if any(monomial[i] for monomial in poly)]
-        for i in used:
-            inner = self._generator_derivative(self.relations.ring.symbols[i].name, unknown, axis)
+        for label in self.relations.labels(poly):
+            inner = self._generator_derivative(label, unknown, axis)
             if inner.numerator:
-                total = (
-                    total
-                    + Quotient(self.relations, self.relations.reduce(poly.diff(self.relations.ring.gens[i]))) * inner
-                )
+                total = total + self.relations.derivative(poly, label) * inner
         return total
 
     def _generator_derivative(self, label: str, unknown: Name, axis: int) -> Quotient:

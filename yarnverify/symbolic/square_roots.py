@@ -44,9 +44,9 @@ def _root(value: Quotient, upper: list[str], lower: list[str]) -> Quotient | Non
     if not top:
         return value
     below = relations.constant(1)
-    for factor, power in value.factors:  # an even denominator
+    for (factor, power), (place, _) in zip(value.below, value.factors, strict=True):  # an even denominator
         top = relations.times_power(top, factor, power % 2)
-        below = below * Quotient(relations, relations.ring(1), ((factor, (power + 1) // 2),))
+        below = below * Quotient(relations, relations.number(1), ((place, (power + 1) // 2),))
     present = set(relations.labels(top))
     if upper:
         *rest_upper, label = upper
@@ -96,16 +96,16 @@ def _base_root(relations: Relations, poly: Poly, roots: Sequence[str]) -> Quotie
     if wanted:
         return None
     content, powers = relations.factor(poly)
-    total = dict(powers)
+    total = {relations.listing(part): power for part, power in powers}
     for label in chosen:  # poly / square, whose root times the root of the square is wanted
         other, parts = relations.factor(relations.squares[label])
         content = content / other
         for part, power in parts:
-            total[part] = total.get(part, 0) - power
+            total[relations.listing(part)] = total.get(relations.listing(part), 0) - power
     outside, _ = rational_root(content)
     root = relations.constant(outside)
-    for part, power in total.items():
-        root = root * Quotient(relations, part) ** (power // 2)
+    for place, power in total.items():
+        root = root * Quotient(relations, relations.listed[place]) ** (power // 2)
     for label in sorted(chosen):
         root = root * relations.make(label)
     return root
@@ -116,7 +116,7 @@ def _odd(relations: Relations, poly: Poly) -> frozenset[Any]:
     if len(poly) > _LONGEST:
         raise UnsupportedError(f"a square root of a polynomial with more than {_LONGEST} terms")
     content, parts = relations.factor(poly)
-    odd = {part for part, power in parts if power % 2}
+    odd: set[Any] = {("factor", relations.listing(part)) for part, power in parts if power % 2}
     numbers: Iterable[int] = (abs(int(content.numerator)), int(content.denominator))
     for number in numbers:
         odd ^= {prime for prime, power in factorint(number).items() if power % 2}
