@@ -83,6 +83,8 @@ class Circles:
         Both sides are continuous, so that their difference is the same full turns everywhere.
         """
         field, labels = self.field, list(self._cosines)
+        if not labels and field.relations.labels(cosine.numerator):
+            return None  # there is nothing that it might hang together with
 
         def balls(place: Place) -> tuple[Any, list[Any]]:
             return place.quotient(cosine).acos(), [place.generator(label) for label in labels]

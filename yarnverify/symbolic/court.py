@@ -117,8 +117,10 @@ class Court:
     @cached_property
     def forms(self) -> Blocks:
         """Normal forms, with signs as far as assumptions settle them."""
-        states = (evaluation.state for evaluation in self._everywhere)
-        return Blocks(Field(self.section, self.names, self.positive, list(states)), self.energy)
+        def samples() -> list[dict[Name, Any]]:
+            return [dict(evaluation.state) for evaluation in self.exact]
+
+        return Blocks(Field(self.section, self.names, self.positive, samples), self.energy)
 
     @property
     def without_value(self) -> bool:

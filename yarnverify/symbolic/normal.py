@@ -51,7 +51,7 @@ class Field(Reading):
     positive
         Parameters that are never negative.
     samples
-        States at which is looked how angles hang together.
+        Gives states at which is looked how angles hang together.
     here
         The state that settles signs which nothing else does.
     """
@@ -61,7 +61,7 @@ class Field(Reading):
         section: Section,
         symbols: Iterable[Name],
         positive: Iterable[Name] = (),
-        samples: Iterable[State] = (),
+        samples: Callable[[], Iterable[State]] = tuple,
         here: State | None = None,
     ) -> None:
         super().__init__(section)
@@ -171,7 +171,7 @@ class Field(Reading):
     @cached_property
     def places(self) -> list[Place]:
         """Where is looked how angles hang together: at the one state that the field is tied to, or at all samples."""
-        return [self._here] if self._here is not None else [self.place(state) for state in self._states]
+        return [self._here] if self._here is not None else [self.place(state) for state in self._states()]
 
     def note(self, holds: Callable[[Place], bool]) -> None:
         """Note what holds at the state here, so that what is proved holds wherever it does."""
