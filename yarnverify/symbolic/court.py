@@ -117,6 +117,7 @@ class Court:
     @cached_property
     def forms(self) -> Blocks:
         """Normal forms, with signs as far as assumptions settle them."""
+
         def samples() -> list[dict[Name, Any]]:
             return [dict(evaluation.state) for evaluation in self.exact]
 
