@@ -36,6 +36,7 @@ EXACT_STATES = 3  # the second reading's; each is a proof of difference, or one 
 _TRIES = 16 * EXACT_STATES  # states drawn in search of such at which both sides have a value
 _WIDE = 160  # states drawn in search of the other side of an absolute value or root
 _SIDES = 24  # states at which a claim is compared that has several sides
+_LOOKED_AT = 2  # states at which what is proved is enclosed by balls
 _REGIONS = 12  # of signs, in each of which a claim is proved anew
 _BALL_BITS = (128, 512, 2048, 8192, 32768)
 _FEW_BITS = _BALL_BITS[:2]
@@ -293,6 +294,18 @@ class Court:
             flint.ctx.prec = before
         return None
 
+    @cached_property
+    def _balls(self) -> list[Evaluation]:
+        """Where what is proved is looked at once more, with true angles and pi."""
+        return [Evaluation(self.section, e.state, Balls(), self.energy) for e in self.exact[:_LOOKED_AT]]
+
+    def _apart(self, evaluation: Evaluation, left: Expr, right: Expr) -> bool:
+        with flint.ctx.workprec(_FEW_BITS[0]):
+            try:
+                return any(not a.overlaps(b) for a, b in self.sides(evaluation, left, right))
+            except UndefinedError:
+                return False
+
     @staticmethod
     def _lacks_value(evaluation: Evaluation, left: Expr, right: Expr) -> bool:
         try:
@@ -338,6 +351,8 @@ class Court:
         if refuted is not None and not (equal and refuted.witness is not None and refuted.witness.right):
             return refuted
         if equal and not compared.differs and compared.seen:
+            if any(self._apart(evaluation, left, right) for evaluation in self._balls):
+                return Finding(Verdict.INCONSISTENT, "equal in exact readings, apart in balls")
             return Finding(Verdict.PROVED)
         if not compared.seen and compared.lacks_value:
             at, why = compared.lacks_value[0]

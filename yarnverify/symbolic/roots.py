@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import prod
-from typing import TYPE_CHECKING, Any
-
-import flint
+from typing import TYPE_CHECKING
 
 from yarnverify.symbolic.polynomials import Poly, Quotient, Relations, rational_root
 from yarnverify.symbolic.reading import UnsupportedError
@@ -34,6 +31,7 @@ class Roots:
         self.field, self.relations = field, field.relations
         self.squares: dict[int, str] = {}
         self.independent = True
+        self._sines: dict[int, Quotient] = {}  # those made of two roots, by what 1 - c^2 is
         self._directions = list(self.relations.squares)  # what makes directions unit vectors
         self._layers: list[str] = []  # independent roots
         self._plain = Relations(labels)  # the squares as products of factors, which directions would hide
@@ -64,27 +62,8 @@ class Roots:
         if value.is_zero:
             return value
         content, parts = self.relations.factor(value.numerator)
-        return self._sqrt(content, parts, value.below)
-
-    def sine(self, cosine: Quotient) -> Quotient:
-        """``sqrt(1 - c^2)`` by its factors ``1 - c`` and ``1 + c``, which the relations of directions would hide."""
-        if not (1 - cosine * cosine).numerator:
-            return self.relations.constant(0)
-        below = prod((factor**power for factor, power in cosine.below), start=self.relations.number(1))
-        content: Any = flint.fmpq(1)
-        joined: dict[int, int] = {}
-        for side in (below - cosine.numerator, below + cosine.numerator):
-            of_side, factors = self.relations.factor(side)
-            content = content * of_side
-            for part, power in factors:
-                place = self.relations.listing(part)
-                joined[place] = joined.get(place, 0) + power
-        above = [(self.relations.listed[place], power) for place, power in joined.items()]
-        return self._sqrt(content, above, [(factor, 2 * power) for factor, power in cosine.below])
-
-    def _sqrt(self, content: Any, above: Factors, below: Factors) -> Quotient:
         outside, inside = self.relations.constant(1), self.relations.number(1)
-        for part, power, invert in [(p, e, False) for p, e in above] + [(p, e, True) for p, e in below]:
+        for part, power, invert in [(p, e, False) for p, e in parts] + [(p, e, True) for p, e in value.below]:
             whole, odd = divmod(power + (power % 2 if invert else 0), 2)
             if whole:
                 outside = outside * self.absolute(Quotient(self.relations, part)) ** (-whole if invert else whole)
@@ -95,12 +74,33 @@ class Roots:
         reduced = self.relations.reduce(inside)
         if reduced == 1:
             return outside
-        if self.relations.listing(reduced) not in self.squares:
+        place = self.relations.listing(reduced)
+        if place in self._sines:
+            return outside * self._sines[place]
+        if place not in self.squares:
             known = self._known(inside, reduced)
             if known is not None:
                 return outside * self.absolute(known)
             self.layer(self._root(reduced), inside)
         return outside * self.relations.make(self._root(reduced))
+
+    def sine(self, cosine: Quotient) -> Quotient:
+        """``sqrt(1 - c^2)``; where it is no root yet, by sine and cosine of half the angle.
+
+        Its radicand has the factors ``1 - c`` and ``1 + c``, which the relations of directions would hide.
+        """
+        square = 1 - cosine * cosine
+        if square.factors or square.is_zero:
+            return square if square.is_zero else self.sqrt(square)
+        place = self.relations.listing(square.numerator)
+        if place in self.squares:
+            label = self.squares[place]
+            if label in self._layers:
+                self._plain.relate(label, (1 - cosine.numerator) * (1 + cosine.numerator))
+            return self.relations.make(label)
+        if place not in self._sines:
+            self._sines[place] = 2 * self.sqrt((1 - cosine) / 2) * self.sqrt((1 + cosine) / 2)
+        return self._sines[place]
 
     def _known(self, inside: Poly, reduced: Poly) -> Quotient | None:
         """The root by others; first as if directions were any vectors, which is fast, and then with their relations."""
