@@ -36,7 +36,7 @@ def outside(names: set[str], allowed: tuple[str, ...]) -> set[str]:
 
 RULES = [
     ("kernels", ("numpy", "yarnverify.kernels")),
-    ("report", ("jinja2", "matplotlib", "yarnverify.report")),
+    ("report", ("jinja2", "markupsafe", "latex2mathml", "matplotlib", "yarnverify.report")),
     (
         "simulation/view",
         (

@@ -1,4 +1,4 @@
-"""The command line: ``yarnverify prove | derive | generate | accuracy | benchmark | fuzz | simulate |
+"""The command line: ``yarnverify prove | derive | generate | check | accuracy | benchmark | fuzz | simulate |
 report``.
 
 Exit status: 0 all as expected; 1 a check failed, or an erratum is new or stale; 2 bad usage or input; 3 asked for but
@@ -40,6 +40,14 @@ Json = Annotated[
     Parameter(
         name="--json", allow_leading_hyphen=True, help="Write the data behind the output here; - for standard output."
     ),
+]
+
+
+Junit = Annotated[Path | None, Parameter(help="Write the verdicts as JUnit XML here.")]
+Summary = Annotated[Path | None, Parameter(help="Write a short summary here, as Markdown.")]
+Annotations = Annotated[
+    bool,
+    Parameter(negative="", help="Also print workflow commands of GitHub Actions, which mark lines of the document."),
 ]
 
 
@@ -128,6 +136,9 @@ def prove(
     *,
     derivations: Derivations = None,
     json_file: Json = None,
+    junit: Junit = None,
+    summary: Summary = None,
+    annotations: Annotations = False,
     cache: Annotated[bool, Parameter(help="Use and keep results that are already known.")] = True,
 ) -> None:
     """A verdict on every printed equation.
@@ -135,15 +146,29 @@ def prove(
     Parameters
     ----------
     document
-        Markdown or text with numbered formulas; the paper's document by default.
+        Markdown or text with numbered formulas, or a folder that holds it; the paper's document by default.
     """
+    from yarnverify import ci
+    from yarnverify.errors import InputError
+    from yarnverify.project import document_of
     from yarnverify.show import show_verdicts
-    from yarnverify.verdicts import verdicts
+    from yarnverify.verdicts import path_of, verdicts
 
-    with progress("proving") as advance:
-        record, took = verdicts(document, derivations, cache, advance)
-    if not _json(record, json_file):
+    document = document_of(document)
+    try:
+        with progress("proving") as advance:
+            record, took = verdicts(document, derivations, cache, advance)
+    except InputError as error:
+        if annotations and error.place:
+            print(ci.annotation("error", *error.place, "yarnverify", error.message), file=sys.stderr)
+        raise
+    path = ci.shown_path(path_of(document))
+    ci.write(record, path, junit, summary)
+    quiet = _json(record, json_file)
+    if not quiet:
         show_verdicts(record, took)
+    if annotations:
+        print(*ci.workflow_commands(record, path), sep="\n", file=sys.stderr if quiet else sys.stdout)
     if not record["as_expected"]:
         sys.exit(1)
 
@@ -162,10 +187,14 @@ def derive(
     Parameters
     ----------
     energy
-        Name of a declared energy, such as bending.
+        Name of a declared energy, such as bending; one of your own as FOLDER/NAME.
     """
+    from yarnverify.project import find
     from yarnverify.symbolic.explain import explain, explanation
 
+    if derivations is None:
+        place, name = find(energy)
+        derivations, energy = place.folder, name or ""
     record = explanation(energy, derivations)
     if not _json(record, json_file):
         print(explain(record, format))
@@ -173,16 +202,25 @@ def derive(
 
 @app.command
 def generate(
+    folder: Path | None = None,
+    /,
     *,
     check: Annotated[bool, Parameter(negative="", help="Compare with the files instead of writing them.")] = False,
     json_file: Json = None,
     cache: Annotated[bool, Parameter(help="Use and keep results that are already known.")] = True,
 ) -> None:
-    """The kernels, from the derivations."""
+    """The kernels, from the derivations.
+
+    Parameters
+    ----------
+    folder
+        Folder with energies of your own; its kernels are written to FOLDER/kernels. The package's own by default.
+    """
     from yarnverify.generation import generate_kernels
+    from yarnverify.project import project
 
     with progress("generating") as advance:
-        outcome = generate_kernels(check, advance, cache)
+        outcome = generate_kernels(check, advance, cache, project(folder))
     _finish(outcome, json_file)
 
 
@@ -198,7 +236,9 @@ def accuracy(
     state: Annotated[
         Path | None, Parameter(help="Folder for what is done, until all is; in the cache by default.")
     ] = None,
-    out: Annotated[Path, Parameter(help="Folder of reports that holds the record.")] = Path("reports"),
+    out: Annotated[
+        Path | None, Parameter(help="Folder of reports that holds the record; reports, or FOLDER/reports, by default.")
+    ] = None,
     write: Annotated[bool, Parameter(negative="", help="Write the record.")] = False,
     check: Annotated[bool, Parameter(negative="", help="Compare with the record instead of showing tables.")] = False,
     replay: Annotated[
@@ -211,22 +251,25 @@ def accuracy(
     Parameters
     ----------
     energy
-        Name of a declared energy, such as bending; all by default.
+        Name of a declared energy, such as bending; a folder with energies of your own, or one of them as FOLDER/NAME.
+        All of the package by default.
     """
+    from yarnverify.project import find
+
+    of, name = find(energy)
     if replay is not None:
         from yarnverify.accuracy.replay import replay as replay_state
         from yarnverify.accuracy.replay import replay_lines
-        from yarnverify.library import derivations
 
-        found = replay_state(replay, derivations())
+        found = replay_state(replay, of.folder, str(of.folder) if of.own else "")
         if not _json(found, json_file):
             print("\n".join(replay_lines(found)))
         return
     from yarnverify.accuracy.command import accuracy as measured
 
     with progress("measuring") as advance:
-        names = () if energy is None else (energy,)
-        outcome = measured(names, variant, profile, executor, jobs, state, out, write, check, advance)
+        names = () if name is None else (name,)
+        outcome = measured(names, variant, profile, executor, jobs, state, out, write, check, advance, of)
     _finish(outcome, json_file)
 
 
@@ -273,20 +316,115 @@ def benchmark(
 
 @app.command
 def report(
+    folder: Path | None = None,
+    /,
     *,
-    out: Annotated[Path, Parameter(help="Folder for the pages and the records behind them.")] = Path("reports"),
+    out: Annotated[
+        Path | None,
+        Parameter(help="Folder for the pages and the records behind them; reports, or FOLDER/reports, by default."),
+    ] = None,
     check: Annotated[bool, Parameter(negative="", help="Compare with the files instead of writing them.")] = False,
     pictures: Annotated[
         bool, Parameter(negative="", help="Draw the pictures of measured records (needs matplotlib).")
     ] = False,
     json_file: Json = None,
 ) -> None:
-    """All of it, to reports/: verdicts, corrections, derivations, kernels, and what was measured; a page an energy."""
+    """All of it, to reports/: verdicts, corrections, derivations, kernels, and what was measured; a page an energy.
+
+    Parameters
+    ----------
+    folder
+        Folder with energies, and perhaps a document, of your own: its kernels are written to FOLDER/kernels and measured.
+        The paper's by default.
+    """
+    from yarnverify.project import project
     from yarnverify.reporting import build_report
 
     with progress("reporting") as advance:
-        outcome = build_report(out, check, advance, pictures)
+        outcome = build_report(out, check, advance, pictures, project(folder))
     _finish(outcome, json_file)
+
+
+@app.command
+def check(
+    target: str | None = None,
+    /,
+    *,
+    energy: Annotated[str | None, Parameter(help="Which energy; found in the target's name by default.")] = None,
+    order: Annotated[
+        str | None,
+        Parameter(
+            help="Order of your unknowns: x0,x1,x2,u1,u2. A name that the energy lacks gets 0; _ is passed over."
+        ),
+    ] = None,
+    returns: Annotated[
+        list[str] | None,
+        Parameter(
+            help="What comes back, in order: energy, gradient or force, hessian or jacobian, blocks such as x1 or x1,u1.",
+            consume_multiple=True,
+            negative="",
+        ),
+    ] = None,
+    force: Annotated[bool, Parameter(negative="", help="Your gradients are forces.")] = False,
+    jacobian: Annotated[bool, Parameter(negative="", help="Your Hessians are Jacobians of forces.")] = False,
+    layout: Annotated[
+        Literal["auto", "single", "component", "element"],
+        Parameter(
+            help="One state a call, arrays (rows, states), or arrays (states, rows); tried in this order by default."
+        ),
+    ] = "auto",
+    column_major: Annotated[bool, Parameter(negative="", help="Your matrices are stored column by column.")] = False,
+    float32: Annotated[bool, Parameter(negative="", help="Hold it to single precision.")] = False,
+    with_: Annotated[
+        tuple[str, ...],
+        Parameter(name="--with", help="What an argument of yours is: kb=k_b, R=d/4, du=u1-u0.", negative=""),
+    ] = (),
+    fix: Annotated[
+        tuple[str, ...], Parameter(help="A parameter that your code has built in: k_b=1.", negative="")
+    ] = (),
+    command: Annotated[
+        str | None,
+        Parameter(help="Instead of a target, a command line: './mine {in} {out}'.", allow_leading_hyphen=True),
+    ] = None,
+    files: Annotated[Literal["json", "npz", "csv"], Parameter(help="What the command reads and writes.")] = "json",
+    write_inputs: Annotated[Path | None, Parameter(help="Only write the states: a .json, .npz or .csv file.")] = None,
+    outputs: Annotated[Path | None, Parameter(help="Instead of a target, results for the states so written.")] = None,
+    count: Annotated[int, Parameter(help="States of each regime.")] = 16,
+    regime: Annotated[
+        tuple[str, ...], Parameter(help="Only these hard cases, such as 'small angle'.", negative="")
+    ] = (),
+    extreme: Annotated[
+        bool, Parameter(negative="", help="Sizes from 1e-200 to 1e200 too, which no cloth has.")
+    ] = False,
+    time_limit: Annotated[float, Parameter(help="Seconds that a call may take.")] = 10.0,
+    derivations: Annotated[Path | None, Parameter(help="Folder of declared energies.")] = None,
+    json_file: Json = None,
+) -> None:
+    """Your own implementation against the truth, over the hard cases, block by block.
+
+    Parameters
+    ----------
+    target
+        module:function, file.py:function, a module or file with functions energy, gradient or force, hessian or jacobian;
+        or library.so:function with the C interface that README.md describes.
+    """
+    from yarnverify.check.command import Options, write_states
+    from yarnverify.check.command import check as checked
+    from yarnverify.check.show import record, show
+
+    options = Options(
+        energy, order, tuple(returns or ()), force, jacobian, layout, column_major, float32, with_, fix, count, regime,
+        extreme, time_limit, derivations,
+    )  # fmt: skip
+    if write_inputs is not None:
+        print(write_states(write_inputs, options))
+        return
+    with progress("checking") as advance:
+        found = checked(target, options, command, outputs, files, advance)
+    if not _json(record(found), json_file):
+        show(found)
+    if not found.passes:
+        sys.exit(1)
 
 
 @app.command
@@ -329,7 +467,7 @@ def simulate(
         found, lines = run(scene, size or (), settings or (), solver, out, resume, every, pictures, tell)
     if not _json({"result": found.result, "timings": found.timings}, json_file):
         print("\n".join([*study_lines(found.result, found.timings), *lines]))
-    if found.failures:
+    if found.missed:
         sys.exit(1)
 
 

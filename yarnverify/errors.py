@@ -8,6 +8,8 @@ class InputError(Exception):
 
     def __init__(self, message: str, place: tuple[str, int, int] | None = None) -> None:
         super().__init__(f"{place[0]}:{place[1]}:{place[2]}: {message}" if place else message)
+        self.message = message
+        self.place = place
 
 
 class NotRunError(Exception):

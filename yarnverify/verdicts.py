@@ -19,6 +19,11 @@ from yarnverify.library import (
 from yarnverify.source import load
 
 
+def path_of(document: Path | None) -> Path:
+    """The path of a document; the main one's for None."""
+    return document if document is not None else derivations() / MAIN_DOCUMENT
+
+
 def verdicts(
     document: Path | None = None,
     choice: str | None = None,
@@ -44,7 +49,7 @@ def verdicts(
         For a document, declarations or errata that cannot be read.
     """
     start = time.perf_counter()
-    path = document if document is not None else derivations() / MAIN_DOCUMENT
+    path = path_of(document)
     source = load(path)
     shelf = shelf_for(path, source.text, choice)
     parts: list[bytes | Path] = [
@@ -64,6 +69,22 @@ def verdicts(
     settle(record, shelf, errata(shelf))
     seconds = time.perf_counter() - start
     return record, f"{'known from an earlier run' if earlier else 'derived and proved'} in {seconds:.2f} s"
+
+
+def nothing_printed() -> dict[str, Any]:
+    """The record of a folder without a document."""
+    record: dict[str, Any] = {
+        "schema": 1,
+        "document": "",
+        "judged": "by nothing, since there is no document",
+        "equations": [],
+        "tally": dict.fromkeys(("proved", "refuted", "undecided", "inconsistent"), 0),
+        "claims": [],
+        "given": [],
+        "completeness": [],
+    }
+    settle(record, Shelf(None, "", ""), ())
+    return record
 
 
 def settle(record: dict[str, Any], shelf: Shelf, accepted: tuple[Erratum, ...]) -> None:

@@ -6,7 +6,8 @@ import shutil
 import sys
 from typing import Any
 
-from yarnverify.report.benchmark import Table, tables, where
+from yarnverify.report.benchmark import tables, where
+from yarnverify.report.table import Table
 
 
 def show_benchmark(record: dict[str, Any]) -> None:

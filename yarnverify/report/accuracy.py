@@ -1,14 +1,25 @@
-"""Tables of the accuracy record, as Markdown."""
+"""Tables of the accuracy record, as rows and as Markdown."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from yarnverify.report.table import Table
+
 _OUTPUTS = ("E", "G", "H")
 _MARK = {"exact": "", "conditioning": "ᶜ", "computation": "*", "not finite": "*"}
+_KEY = (
+    "No mark: at most 16 units. ᶜ: more, explained by the condition of the state (16 units and 8 for each unit of the "
+    "condition number). *: lost by the computation. ∞: not finite where the true result is. –: no true result in range."
+)
 
 
-def accuracy_table(record: dict[str, Any], energy: str, dtype: str = "float64") -> str:
+def kinds(record: dict[str, Any], energy: str) -> list[str]:
+    """The floating-point types in which an energy was measured, widest first."""
+    return sorted({cell["dtype"] for cell in record["cells"] if cell["energy"] == energy}, reverse=True)
+
+
+def error_table(record: dict[str, Any], energy: str, dtype: str = "float64") -> Table:
     """Worst errors of an energy: a row a regime, a column a variant.
 
     Parameters
@@ -16,31 +27,44 @@ def accuracy_table(record: dict[str, Any], energy: str, dtype: str = "float64") 
     record
         As ``yarnverify accuracy`` writes it.
     energy, dtype
-        Which cells.
+        Which cells; one of those that :func:`kinds` lists.
     """
     cells = [cell for cell in record["cells"] if cell["energy"] == energy and cell["dtype"] == dtype]
-    if not cells:
-        return f"Accuracy of {energy} in {dtype}: not run.\n"
     variants = list(dict.fromkeys(cell["variant"] for cell in cells))
     found = {(cell["regime"], cell["variant"]): cell for cell in cells}
     unit = {"float64": "2^-53", "float32": "2^-24"}[dtype]
-    lines = [
+    title = (
         f"Worst error of energy / gradient / Hessian in units of {unit} ({dtype}), "
-        f"{record['points']} states a regime, normwise by blocks:",
-        "",
-        "| regime | " + " | ".join(variants) + " |",
-        "|---" * (len(variants) + 1) + "|",
+        f"{record['points']} states a regime, normwise by blocks"
+    )
+    rows = tuple(
+        (regime, *(_entry(found.get((regime, variant))) for variant in variants))
+        for regime in dict.fromkeys(cell["regime"] for cell in cells)
+    )
+    missing = tuple(f"Not run: {text}." for text in record["not_run"] if energy in text.split(":")[0].split())
+    return Table(title, ("regime", *variants), rows, (_KEY, *missing))
+
+
+def accuracy_table(record: dict[str, Any], energy: str, dtype: str = "float64") -> str:
+    """The table of worst errors as Markdown."""
+    if dtype not in kinds(record, energy):
+        return f"Accuracy of {energy} in {dtype}: not run.\n"
+    table = error_table(record, energy, dtype)
+    lines = [f"{table.title}:", "", f"| {' | '.join(table.headings)} |", "|---" * len(table.headings) + "|"]
+    lines += [f"| {' | '.join(row)} |" for row in table.rows]
+    return "\n".join([*lines, "", *table.notes]) + "\n"
+
+
+def worst_state(record: dict[str, Any], energy: str, variant: str) -> str | None:
+    """The state at which a variant did worst, as ``yarnverify accuracy --replay`` takes it."""
+    outputs = [
+        cell["outputs"][output]
+        for cell in record["cells"]
+        if cell["energy"] == energy and cell["variant"] == variant and cell["dtype"] == "float64"
+        for output in _OUTPUTS
     ]
-    for regime in dict.fromkeys(cell["regime"] for cell in cells):
-        entries = [_entry(found.get((regime, variant))) for variant in variants]
-        lines.append(f"| {regime} | " + " | ".join(entries) + " |")
-    lines += [
-        "",
-        "No mark: at most 16 units. ᶜ: more, explained by the condition of the state (16 units and 8 for each unit of the "
-        "condition number). *: lost by the computation. ∞: not finite where the true result is. –: no true result in range.",
-    ]
-    lines += [f"Not run: {text}." for text in record["not_run"] if energy in text.split(":")[0].split()]
-    return "\n".join(lines) + "\n"
+    there = [found for found in outputs if isinstance(found["worst"], float | int) and found.get("replay")]
+    return max(there, key=lambda found: found["worst"])["replay"] if there else None
 
 
 def _entry(cell: dict[str, Any] | None) -> str:
@@ -53,5 +77,8 @@ def _number(found: dict[str, Any]) -> str:
         return "–"
     if worst == "inf":
         return "∞*"
-    text = f"{worst:.2g}" if worst < 1000 else f"{worst:.0e}".replace("e+", "e").replace("e0", "e")
+    if worst < 1000:
+        text = f"{worst:.0f}" if worst >= 100 else f"{worst:.2g}"
+    else:
+        text = f"{worst:.0e}".replace("e+", "e").replace("e0", "e")
     return text + _MARK[found["label"]]

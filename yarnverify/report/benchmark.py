@@ -5,24 +5,15 @@ Timings belong to the machine and the moment that the record names; they are sho
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from yarnverify.report.table import Table
+
 SHOWN_AT = 100_000  # ratios are those at the largest batch up to this
 FLOOR = "memory floor"
-
-
-@dataclass(frozen=True)
-class Table:
-    """A title, headings, rows of as many cells, and what to say below."""
-
-    title: str
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    notes: tuple[str, ...] = ()
 
 
 def benchmark_table(record: dict[str, Any], energy: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from yarnverify.report.accuracy import accuracy_table
+from yarnverify.report.accuracy import accuracy_table, kinds
 from yarnverify.report.benchmark import benchmark_table
 
 _TEMPLATES = Environment(
@@ -20,7 +20,9 @@ _TEMPLATES = Environment(
 )
 
 
-def pages(records: dict[str, Any], pictures: Sequence[str] = ()) -> dict[str, str]:
+def pages(
+    records: dict[str, Any], pictures: Sequence[str] = (), source: str = "../derivations", name: str = ""
+) -> dict[str, str]:
     """File name to text: an index, and a page an energy.
 
     Parameters
@@ -30,28 +32,39 @@ def pages(records: dict[str, Any], pictures: Sequence[str] = ()) -> dict[str, st
         ``accuracy`` and ``benchmark`` where measured.
     pictures
         Names of the pictures that are in ``pictures/``.
+    source
+        The folder with the document, as seen from the pages.
+    name
+        What the command line calls that folder; empty for the one that comes with the package.
     """
+    place = {"source": source, "argument": f" {name}" if name else "", "prefix": f"{name}/" if name else ""}
     found, derived = records["verdicts"], records["derivations"]
     texts = {
         "README.md": _render(
-            "index.md.jinja", found=found, derived=derived, rows=_rows(found, ""), mistakes=_mistakes(found, None)
+            "index.md.jinja",
+            found=found,
+            derived=derived,
+            rows=_rows(found, ""),
+            mistakes=mistakes(found, None),
+            place=place,
         )
     }
-    for name, derivation in derived.items():
+    for energy, derivation in derived.items():
         section = derivation["section"]
-        texts[f"{name}.md"] = _render(
+        texts[f"{energy}.md"] = _render(
             "energy.md.jinja",
-            name=name,
+            name=energy,
             section=section,
             found=found,
             derivation=derivation,
             rows=_rows(found, section),
-            mistakes=_mistakes(found, section),
+            mistakes=mistakes(found, section) if section else [],
             completeness=next((part for part in found["completeness"] if part["section"] == section), None),
-            kernels=records["kernels"].get(name, {}),
-            accuracy=_accuracy(records.get("accuracy"), name),
-            benchmark=_benchmark(records.get("benchmark"), name),
+            kernels=records["kernels"].get(energy, {}),
+            accuracy=_accuracy(records.get("accuracy"), energy),
+            benchmark=_benchmark(records.get("benchmark"), energy),
             pictures=pictures,
+            place=place,
         )
     return dict(sorted(texts.items()))
 
@@ -60,8 +73,7 @@ def _accuracy(record: dict[str, Any] | None, energy: str) -> list[str]:
     """The tables of an energy; empty where the sweep was not run."""
     if record is None:
         return []
-    kinds = sorted({cell["dtype"] for cell in record["cells"] if cell["energy"] == energy}, reverse=True)
-    return [accuracy_table(record, energy, kind) for kind in kinds]
+    return [accuracy_table(record, energy, kind) for kind in kinds(record, energy)]
 
 
 def _benchmark(record: dict[str, Any] | None, energy: str) -> str:
@@ -84,7 +96,7 @@ def _rows(found: dict[str, Any], section: str) -> list[dict[str, Any]]:
     return list(rows.values())
 
 
-def _mistakes(found: dict[str, Any], section: str | None) -> list[dict[str, Any]]:
+def mistakes(found: dict[str, Any], section: str | None) -> list[dict[str, Any]]:
     """What is not proved, in a section or anywhere: one entry for each equation and reason."""
     groups: dict[tuple[str, str], dict[str, Any]] = {}
     for claim in found["claims"]:

@@ -101,7 +101,7 @@ def error_against_angle(record: dict[str, Any], energy: str) -> Figure | None:
     handles.append(
         Line2D([], [], color="0.55", linewidth=3, label="conditioning: what one rounding of the inputs costs")
     )
-    figure.legend(handles=handles, loc="outside upper center", ncols=min(len(handles), 4), frameon=False)
+    figure.legend(handles=handles, loc="outside upper center", ncols=min(len(handles), 1 + len(shown)), frameon=False)
     return figure
 
 

@@ -117,7 +117,7 @@ class Dynamics:
         scheme: Scheme = "midpoint",
         solver: Solver | None = None,
         held: Callable[[float, Array], None] | None = None,
-        engine: Literal["numpy", "compiled"] = "numpy",
+        engine: Literal["auto", "numpy", "compiled"] = "auto",
         **options: Any,
     ) -> None:
         if scheme not in ORDERS:
@@ -125,7 +125,7 @@ class Dynamics:
         self.system = System(Q, terms, active, loads, others=[elements_of(kinetic)], engine=engine)
         self.inertia = Inertia(self.system, kinetic)
         self.scheme, self.held = scheme, held
-        self.options = {"residual": 1e-13, "stable": False, "iterations": 100, **options}
+        self.options = {"residual": 0.0, "step": 1e-16, "stable": False, "iterations": 100, **options}
         self.solver = solver
         self._own: dict[str, Solver] = {}
         self._fixed = np.ones(self.system.size, bool)
@@ -158,7 +158,7 @@ class Dynamics:
         _positive(h=h)
         problem = self._increment(motion, h)
         try:
-            end = self._end(problem, motion, h)
+            end, left = self._end(problem, motion, h)
             q, v = problem.at(end), problem.rate(end)
             found = self.inertia.kinetic(q, v)
             force = found.slope - self.system.slope(q)
@@ -174,6 +174,7 @@ class Dynamics:
         else:
             momentum = problem.momentum + problem.tau * force
             momentum[self._fixed] = found.momentum[self._fixed]
+        momentum[self.system.active] += left
         time, lost = _later(motion, h)
         return replace(
             motion, time=time, lost=lost, Q=end, P=momentum, V=v, kinetic=found.energy, potential=potential, h=h,
@@ -221,7 +222,8 @@ class Dynamics:
         back, momentum = Q + share * (Q - motion.Q_before), P + share * (P - motion.P_before)
         return Increment(self.inertia, nothing, 1.0, back, h * (1 + ratio) / (1 + 2 * ratio), momentum)
 
-    def _end(self, problem: Increment, motion: Motion, h: float) -> Array:
+    def _end(self, problem: Increment, motion: Motion, h: float) -> tuple[Array, Array]:
+        """Where the step ends, and what the momenta there lack (active,) because positions are rounded."""
         start = motion.Q + h * motion.V
         start[self._fixed] = motion.Q[self._fixed]
         if self.held is not None:
@@ -235,12 +237,13 @@ class Dynamics:
             start[active] = motion.Q[active]
             return self._solve(problem, start, motion)
 
-    def _solve(self, problem: Increment, start: Array, motion: Motion) -> Array:
+    def _solve(self, problem: Increment, start: Array, motion: Motion) -> tuple[Array, Array]:
         if self.inertia.bind(start, motion.Q, motion.Q_before):
-            return minimise(problem, start, self.solver or self._symmetric(problem), **self.options).Q
+            found = minimise(problem, start, self.solver or self._symmetric(problem), **self.options)
+            return found.Q, problem.lacking(found.gradient, found.step)
         if "any" not in self._own:
             self._own["any"] = SuperLU(problem.nodes, problem.coordinates)
-        return problem.solve(start, self.solver or self._own["any"])
+        return problem.solve(start, self.solver or self._own["any"]), np.zeros(self.system.count)
 
     def _symmetric(self, problem: Increment) -> Solver:
         if "symmetric" not in self._own:

@@ -78,9 +78,17 @@ class Increment:
         energy, gradient, matrix, force = self.inertia.system.evaluate(self.at(Q), definite)
         work, slope = self._inertial(Q)
         matrix.data *= self.a * self.a
-        matrix.data += self.inertia.active_mass.data / self.tau**2
+        self.inertia.add_mass(matrix, 1 / self.tau**2)
         size = float(np.abs(self.momentum[self.active]).max(initial=0.0)) / self.tau
         return Evaluation(energy + work, self.a * gradient + slope[self.active], matrix, max(self.a * force, size))
+
+    def lacking(self, gradient: Array, step: Array) -> Array:
+        """Momentum (active,) by which the end of a step differs where a step of less than rounding is still to be made.
+
+        With the residual r and the step d, K the stiffness: force and inertia balance at ``F - a K d``, and
+        ``(a a K + M/tau^2) d = -r``.
+        """
+        return (gradient + self.inertia.active_mass @ step / self.tau**2) * self.tau / self.a
 
     def worst(self, Q: Array) -> Worst | None:
         """The element of the greatest residual."""

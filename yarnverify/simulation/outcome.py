@@ -38,6 +38,8 @@ class Equilibrium:
         Unstable equilibria that were left.
     seconds
         Time by ``evaluation`` and ``solve``.
+    gradient, step
+        Gradient there and the step that it still asks for, too small to be told from rounding, (active,); zeros if unknown.
     """
 
     Q: Array
@@ -46,6 +48,8 @@ class Equilibrium:
     negative: int | None
     departures: int
     seconds: dict[str, float]
+    gradient: Array
+    step: Array
 
     @property
     def iterations(self) -> int:

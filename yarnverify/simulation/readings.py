@@ -33,3 +33,10 @@ def slopes(Q: ArrayLike, table: Table, along: int, across: int) -> Array:
     """Angle of each segment in the plane of two axes, from the first towards the second, (n,), rad, without jumps."""
     edge = edges(Q, table)
     return np.unwrap(np.arctan2(edge[across], edge[along]))
+
+
+def deviations(Q: ArrayLike, table: Table) -> Array:
+    """Right angle less the angle between warp and weft in each quadrant of a table of shears, (n,), rad."""
+    q = np.asarray(Q, float)[table.rows]
+    warp, weft = q[3:6] - q[:3], q[6:9] - q[:3]
+    return np.arctan2((warp * weft).sum(axis=0), np.linalg.norm(np.cross(warp, weft, axis=0), axis=0))

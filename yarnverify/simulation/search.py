@@ -76,9 +76,9 @@ class Search:
                     self._return(value)
                 else:
                     self._note(value, 0.0, "end")
-                    return Equilibrium(
-                        self.Q, value.energy, self.history, negative, self.departures, self.steps.seconds
-                    )
+                    left = step if step.size else np.zeros_like(value.gradient)
+                    return Equilibrium(self.Q, value.energy, self.history, negative, self.departures, self.steps.seconds,
+                                       value.gradient, left)  # fmt: skip
                 continue
             size = float(np.abs(step).max())
             progress |= size < 0.5 * self._step

@@ -21,6 +21,7 @@ import numpy as np
 
 from yarnverify.symbolic.algebraic import Algebraic, Number, UndefinedError
 from yarnverify.symbolic.document import Section
+from yarnverify.symbolic.exponentials import NAMES
 from yarnverify.symbolic.functions import unfolded
 from yarnverify.symbolic.jets import Jet
 from yarnverify.symbolic.linear import linear_form, tree_of
@@ -141,6 +142,8 @@ class Evaluation:
         if op == "identity":
             constant = self.numbers.constant
             return np.array([[constant(Fraction(int(i == j))) for j in range(3)] for i in range(3)], dtype=object)
+        if op == "call" and expr.value in NAMES:
+            return self._exponential(str(expr.value), self._value(expr.args[0], jets))
         if op == "call" and (plain := unfolded(expr)) is not None:
             return self._value(plain, jets)
         if op == "call" and expr.value != "arccos":
@@ -218,6 +221,15 @@ class Evaluation:
         sine = self.numbers.sqrt(1 - cosine * cosine)
         slope = -1 / _nonzero(sine)
         return value.chain(angle, slope, cosine * slope * slope * slope)
+
+    def _exponential(self, function: str, value: Any) -> Any:
+        """A logarithm or an exponential."""
+        inner = Jet._lift(value).value
+        result = self.numbers.log(inner) if function == "log" else self.numbers.exp(inner)
+        if not isinstance(value, Jet):
+            return result
+        slope = 1 / inner if function == "log" else result
+        return value.chain(result, slope, -slope * slope if function == "log" else result)
 
     def _cosine_of(self, expr: Expr) -> Expr | None:
         """The tree under the arc cosine of which this one is an even positive power; None if it is anything else."""

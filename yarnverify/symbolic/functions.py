@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from yarnverify.symbolic.tree import ONE, PI, Expr
 
-FUNCTIONS = ("sin", "cos", "tan", "cot", "arcsin", "arccos", "arctan")
+FUNCTIONS = ("sin", "cos", "tan", "cot", "arcsin", "arccos", "arctan", "log", "exp")
 OF_TWO = ("atan2",)  # written \operatorname{atan2}(y, x)
-INVERSE = ("arcsin", "arccos", "arctan", "atan2")
 
 
 def unfolded(expr: Expr) -> Expr | None:

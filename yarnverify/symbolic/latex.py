@@ -64,7 +64,8 @@ def _call(expr: Expr, power: str = "") -> str:
     if expr.value in OF_TWO:
         return f"\\operatorname{{{expr.value}}}\\left( {', '.join(map(latex, expr.args))} \\right)"
     arg = expr.args[0]
-    return f"\\{expr.value}{power} {latex(arg) if _bare(arg) else _group(arg)}"
+    name = "ln" if expr.value == "log" else expr.value
+    return f"\\{name}{power} {latex(arg) if _bare(arg) else _group(arg)}"
 
 
 def _bars(expr: Expr, bar: str) -> str:

@@ -57,7 +57,7 @@ class Law:
                     return self.scalar(plain)
                 if expr.value == "arccos":
                     return self._angle(args[0])
-                function = {"sin": sp.sin, "cos": sp.cos, "tan": sp.tan}[str(expr.value)]
+                function = {"sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "log": sp.log, "exp": sp.exp}[str(expr.value)]
                 return function(self.scalar(args[0]))
         raise NoMeasuresError
 

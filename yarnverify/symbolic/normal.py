@@ -29,6 +29,7 @@ import flint
 from yarnverify.symbolic.circles import Circles
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.enclosures import BITS, Place, Recipe
+from yarnverify.symbolic.logarithms import Exponentials
 from yarnverify.symbolic.polynomials import Poly, Quotient, Relations
 from yarnverify.symbolic.reading import Reading, UnsupportedError, Value, fold, plus
 from yarnverify.symbolic.roots import Roots
@@ -92,7 +93,7 @@ class Field(Reading):
         self._states = samples
         self._places: dict[int, Place] = {}
         self._notes: list[Callable[[Place], bool]] = []
-        self.roots, self.circles = Roots(self, labels), Circles(self)
+        self.roots, self.circles, self.exponentials = Roots(self, labels), Circles(self), Exponentials(self)
 
     def constant(self, value: Any) -> Quotient:
         return self.relations.constant(value)
@@ -103,6 +104,12 @@ class Field(Reading):
 
     def arccos(self, cosine: Quotient) -> Quotient:
         return self.circles.arccos(cosine)
+
+    def log(self, value: Quotient) -> Quotient:
+        return self.exponentials.log(value)
+
+    def exp(self, value: Quotient) -> Quotient:
+        return self.exponentials.exp(value)
 
     def circle(self, angle: Quotient) -> tuple[Quotient, Quotient]:
         return self.circles.point(angle)

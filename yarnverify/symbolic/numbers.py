@@ -21,6 +21,7 @@ from yarnverify.symbolic.algebraic import (
     exact_root,
     sign,
 )
+from yarnverify.symbolic.exponentials import Drawn
 from yarnverify.symbolic.turns import PARTS_OF_PI, Pair, candidates, multiple, of_pi, turned
 
 _MOST_ROOTS = 5
@@ -45,6 +46,7 @@ class Rationals:
         self._drawn: list[Number] = []  # the cosines of those angles that were drawn
         self._circles: dict[Number, Pair] = {}
         self.pi = self._beside(flint.arb.pi())
+        self._transcendental = Drawn(self._beside)
 
     def _beside(self, value: Any) -> Number:
         """A rational number beside a ball, over a drawn denominator."""
@@ -107,6 +109,14 @@ class Rationals:
     def _point(self, cosine: Number) -> Pair:
         return self.sqrt(1 - cosine * cosine), cosine
 
+    def log(self, value: Number) -> Number:
+        if not self.positive(value):
+            raise NoValueError("logarithm of what is not positive")
+        return self._transcendental.log(value, approximate(value))
+
+    def exp(self, value: Number) -> Number:
+        return self._transcendental.exp(value, approximate(value))
+
     def circle(self, angle: Number) -> Pair:
         """A rational point of the unit circle, drawn for an angle that no arc cosine explains."""
         if angle not in self._circles:
@@ -148,6 +158,16 @@ class Balls:
     def circle(self, angle: Number) -> tuple[Number, Number]:
         return angle.sin(), angle.cos()
 
+    def log(self, value: Number) -> Number:
+        if value <= 0:
+            raise NoValueError("logarithm of what is not positive")
+        if not value > 0:
+            raise UndefinedError("logarithm of what may be zero")
+        return value.log()
+
+    def exp(self, value: Number) -> Number:
+        return value.exp()
+
     @staticmethod
     def squared_arccos(cosine: Number) -> tuple[Number, Number, Number]:
         """``arccos(c)^2`` with its first two derivatives by c: an analytic function at c = 1, and beyond.
@@ -188,3 +208,9 @@ class Floats:
 
     def circle(self, angle: Number) -> tuple[Number, Number]:
         return math.sin(angle), math.cos(angle)
+
+    def log(self, value: Number) -> Number:
+        return math.log(value)
+
+    def exp(self, value: Number) -> Number:
+        return math.exp(value)

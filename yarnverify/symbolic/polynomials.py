@@ -6,7 +6,7 @@ generators, so they are a Groebner basis for the lexicographic order, and the re
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -226,13 +226,16 @@ class Relations:
         return self._factored[place]
 
 
+def prime_powers(value: Any) -> list[tuple[int, int]]:
+    """Prime factors of a positive rational."""
+    below = [(prime, -power) for prime, power in factorint(int(value.denominator)).items()]
+    return [*factorint(int(value.numerator)).items(), *below]
+
+
 def rational_root(value: Any) -> tuple[Any, Any]:
     """A positive rational as (root of its square part, rest)."""
     outside, inside = flint.fmpq(1), flint.fmpq(1)
-    powers: Mapping[int, int]
-    for sign, number in ((1, value.numerator), (-1, value.denominator)):
-        powers = factorint(int(number))
-        for prime, power in powers.items():
-            outside *= flint.fmpq(prime) ** (sign * power // 2)
-            inside *= flint.fmpq(prime) ** (power % 2)
+    for prime, power in prime_powers(value):
+        outside *= flint.fmpq(prime) ** (power // 2)
+        inside *= flint.fmpq(prime) ** (power % 2)
     return outside, inside

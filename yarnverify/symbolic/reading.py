@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from yarnverify.symbolic.document import Section
+from yarnverify.symbolic.exponentials import NAMES
 from yarnverify.symbolic.functions import unfolded
 from yarnverify.symbolic.tree import Expr, Name
 
@@ -47,6 +48,12 @@ class Reading(ABC):
     @abstractmethod
     def circle(self, angle: Any) -> tuple[Any, Any]:
         """Sine and cosine."""
+
+    def log(self, value: Any) -> Any:
+        raise UnsupportedError("a logarithm")
+
+    def exp(self, value: Any) -> Any:
+        raise UnsupportedError("an exponential")
 
     pi: Any
 
@@ -123,6 +130,8 @@ class Reading(ABC):
             case "call":
                 if expr.value == "arccos":
                     return self.arccos(values[0])
+                if expr.value in NAMES:
+                    return self.log(values[0]) if expr.value == "log" else self.exp(values[0])
                 sine, cosine = self.circle(values[0])
                 return {"sin": lambda: sine, "cos": lambda: cosine, "tan": lambda: sine / cosine}[str(expr.value)]()
         raise AssertionError(f"no such operation: {op}")

@@ -17,7 +17,7 @@ Signature = tuple[int, ...]
 
 
 def sided(section: Section, trees: Iterable[Expr]) -> list[Expr]:
-    """Arguments of the absolute values, square roots and arc cosines of some trees, definitions followed.
+    """Absolute values, square roots, arc cosines and logarithms in some trees, definitions followed.
 
     Which way these go depends on the sign of the argument, or on whether it is within [-1, 1]. Norms of vectors are no such.
     """
@@ -36,7 +36,7 @@ def sided(section: Section, trees: Iterable[Expr]) -> list[Expr]:
             elif (
                 node.op in {"abs", "sqrt"}
                 or (node.op == "norm" and section.type_of(node.args[0]) is Type.SCALAR)
-                or (node.op == "call" and node.value == "arccos")
+                or (node.op == "call" and node.value in ("arccos", "log"))
             ):
                 found.setdefault(node)
 
@@ -53,7 +53,7 @@ def side_of(evaluation: Evaluation, node: Expr) -> int:
         return -1
     except UndefinedError:
         return 0
-    if node.op == "call":
+    if node.value == "arccos":
         value = 1 - value * value
     return _sign(value)
 

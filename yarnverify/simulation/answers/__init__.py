@@ -5,8 +5,10 @@ Pure functions of numbers; each states its formula and where it comes from.
     chains      hanging yarn, catenary with and without stretch, a crossing that slides
     rods        cantilever with a load at its tip or under its own weight, arc, ring, buckling, frequencies
     cloth       picture frame, bias extension, parallel contact
+    bias        bias extension of a net of yarns that do not stretch, of any proportions
 """
 
+from yarnverify.simulation.answers.bias import bias_net
 from yarnverify.simulation.answers.chains import (
     Catenary,
     Chain,
@@ -29,7 +31,8 @@ from yarnverify.simulation.answers.rods import (
 )
 
 __all__ = [
-    "Cantilever", "Catenary", "Chain", "Tip", "arc", "bias_extension", "buckled", "buckling_load", "cantilever", "catenary",
+    "Cantilever", "Catenary", "Chain", "Tip", "arc", "bias_extension", "bias_net", "buckled", "buckling_load",
+    "cantilever", "catenary",
     "contact_gap", "elastica", "elastica_shape", "frequency", "hanging_chain", "hanging_elongation", "hung_chain",
     "picture_frame", "ring_energy", "sliding_split",
 ]  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -41,6 +42,7 @@ class Cantilever:
         return np.pi / 2 - angle, np.stack([along, across], axis=-1)
 
 
+@lru_cache(maxsize=16)
 def cantilever(beta: float, alpha: float = 0.0, tolerance: float = 1e-11) -> Cantilever:
     """A clamped rod under its own weight, beta = rho g L^3/EI, and a load at its tip, alpha = P L^2/EI, both downwards.
 

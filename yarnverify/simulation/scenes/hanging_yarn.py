@@ -8,7 +8,7 @@ from yarnverify.simulation.fabric import segments, yarn
 from yarnverify.simulation.quantities import positive, real
 from yarnverify.simulation.readings import tensions
 from yarnverify.simulation.scene import scene
-from yarnverify.simulation.setting import Known, Stage, Static
+from yarnverify.simulation.setting import Known, Stage, Static, rounding
 
 
 @scene(
@@ -20,13 +20,11 @@ from yarnverify.simulation.setting import Known, Stage, Static
 )
 def hanging_yarn(
     size: int,
-    length: float = positive(1.0, "m"),
-    k_s: float = positive(
-        0.02, "N", "soft, 20 times its own weight, so that the stretch is seen: a cotton yarn has some 50 N"
-    ),
+    length: float = positive(0.1, "m"),
+    k_s: float = positive(2e-3, "N", "soft, so that the stretch is seen: a cotton yarn has some 50 N"),
     rho: float = positive(1e-4, "kg/m", "100 tex, a cotton yarn"),
     g: float = positive(9.81, "m/s^2", "gravity"),
-    tip_force: float = real(5e-4, "N", "half the weight of the yarn"),
+    tip_force: float = real(5e-5, "N", "half the weight of the yarn"),
 ) -> Static:
     fabric = yarn(length, size, direction=(0, 0, -1))
     table = segments(fabric)
@@ -41,14 +39,9 @@ def hanging_yarn(
         raise InputError(f"tip_force = {tip_force:g} N lifts the yarn: one that hangs is pulled in every segment")
     known = [
         Known("height of a node", "m", exact.points[:, 1], lambda end: end.points[:, 2]),
-        Known(
-            "tension of a segment",
-            "N",
-            exact.tension,
-            lambda end: tensions(end.Q, table, k_s),
-            scale=float(max(abs(exact.tension))) or k_s,
-        ),
-    ]
+        Known("tension of a segment", "N", exact.tension, lambda end: tensions(end.Q, table, k_s),
+              within=rounding(size * k_s / exact.tension.max())),
+    ]  # fmt: skip
     return Static(
         fabric, terms, fabric.positions(range(1, size + 1)), known, [Stage(loads)], view="front", colour="stretch"
     )

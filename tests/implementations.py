@@ -1,0 +1,234 @@
+"""Implementations to be checked, as people write them: right ones, and one for each mistake that is to be recognised."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import time
+from typing import Any
+
+import numpy as np
+
+from yarnverify.kernels.accurate import bending, shear, stretch
+
+
+def _of(kernel: Any, q: Any, **parameters: Any) -> tuple[Any, Any, Any]:
+    e, g, h = kernel.evaluate(q, **parameters, errors="mask")
+    return e, g, h
+
+
+# -- right, in several manners ----------------------------------------------------------------------------------------
+
+
+def bending_of_arrays(q: Any, k_b: Any) -> Any:
+    return _of(bending, q, k_b=k_b)
+
+
+def bending_element_first(q: Any, kb: Any) -> Any:
+    e, g, h = _of(bending, q.T, k_b=kb)
+    return {"V": e, "force": -g.T, "jac": -h.transpose(2, 0, 1)}
+
+
+def bending_by_name(x0: Any, x1: Any, x2: Any, u1: float, u2: float, Kb: float) -> Any:
+    e, g, h = _of(bending, np.concatenate([x0, x1, x2, [u1, u2]])[:, None], k_b=Kb)
+    return float(e[0]), g[:, 0], h[..., 0]
+
+
+def bending_blocks(q: Any, k_b: float) -> Any:
+    """Two blocks of the force and one of its Jacobian, of one state."""
+    _, g, h = _of(bending, q[:, None], k_b=k_b)
+    return -g[3:6, 0], -g[6:9, 0], -h[3:6, 6:9, 0]
+
+
+def bending_previous_middle_next(q: Any, k_b: Any) -> Any:
+    """Rows x2, x0, x1, u2, u1, as in a chain of points."""
+    mine = [6, 7, 8, 0, 1, 2, 3, 4, 5, 10, 9]
+    own = np.argsort(mine)
+    e, g, h = _of(bending, q[own], k_b=k_b)
+    return e, g[mine], h[np.ix_(mine, mine)]
+
+
+def bending_of_nodes(q: Any, k_b: Any) -> Any:
+    """Nodes (x, u, v): 15 rows, of which u of the middle and all v do nothing."""
+    where = [0, 1, 2, 5, 6, 7, 10, 11, 12, 8, 13]
+    _, g, h = _of(bending, q[where], k_b=k_b)
+    force, jacobian = np.zeros((15, q.shape[1])), np.zeros((15, 15, q.shape[1]))
+    force[where] = -g
+    jacobian[np.ix_(where, where)] = -h
+    return force, jacobian
+
+
+def stretch_by_radius(q: Any, Y: Any, R: Any) -> Any:
+    """Young's modulus and radius instead of the stiffness."""
+    return _of(stretch, q, k_s=Y * np.pi * R**2)
+
+
+# -- mistakes ---------------------------------------------------------------------------------------------------------
+
+
+def bending_force_unsaid(q: Any, k_b: Any) -> Any:
+    e, g, h = _of(bending, q, k_b=k_b)
+    return e, -g, h
+
+
+def bending_all_signs(q: Any, k_b: Any) -> Any:
+    e, g, h = _of(bending, q, k_b=k_b)
+    return e, -g, -h
+
+
+def bending_factor(q: Any, k_b: Any) -> Any:
+    e, g, h = _of(bending, q, k_b=k_b)
+    g[3:6] *= 2
+    return e, g, h
+
+
+def bending_half(q: Any, k_b: Any) -> Any:
+    return tuple(part / 2 for part in _of(bending, q, k_b=k_b))
+
+
+def bending_without_stiffness(q: Any, k_b: Any) -> Any:
+    return _of(bending, q, k_b=1.0)
+
+
+def bending_without_length(q: Any, k_b: Any) -> Any:
+    e, g, h = _of(bending, q, k_b=k_b)
+    h[3:6, 3:6] *= np.sqrt(((q[3:6] - q[:3]) ** 2).sum(axis=0))
+    return e, g, h
+
+
+def bending_angle_unsquared(q: Any, k_b: Any) -> Any:
+    """The angle where its square belongs, in the forces on u1 and u2."""
+    e, g, h = _of(bending, q, k_b=k_b)
+    with np.errstate(all="ignore"):
+        g[9:] /= np.sqrt(e * (q[9] - q[10]) / k_b)
+    return e, g, h
+
+
+def bending_transposed(q: Any, k_b: Any) -> Any:
+    e, g, h = _of(bending, q, k_b=k_b)
+    h[3:6, 6:9] = h[3:6, 6:9].swapaxes(0, 1).copy()
+    return e, g, h
+
+
+def bending_swapped(q: Any, k_b: Any) -> Any:
+    e, g, h = _of(bending, q, k_b=k_b)
+    g[3:9] = np.concatenate([g[6:9], g[3:6]])
+    return e, g, h
+
+
+def bending_left_out(q: Any, k_b: Any) -> Any:
+    e, g, h = _of(bending, q, k_b=k_b)
+    h[9, 9] = 0
+    return e, g, h
+
+
+def shear_gauss_newton(q: Any, k_x: Any, L: Any) -> Any:
+    e, g, _ = _of(shear, q, k_x=k_x, L=L)
+    with np.errstate(all="ignore"):
+        return e, g, g[:, None] * g[None] / (2 * e)
+
+
+def _definite(h: Any) -> Any:
+    values, vectors = np.linalg.eigh(np.nan_to_num(np.moveaxis(h, -1, 0)))
+    return np.moveaxis((vectors * np.maximum(values, 0)[:, None]) @ vectors.swapaxes(1, 2), 0, -1)
+
+
+def stretch_definite(q: Any, k_s: Any) -> Any:
+    e, g, h = _of(stretch, q, k_s=k_s)
+    return e, g, _definite(h)
+
+
+def shear_definite(q: Any, k_x: Any, L: Any) -> Any:
+    e, g, h = _of(shear, q, k_x=k_x, L=L)
+    return e, g, _definite(h)
+
+
+def shear_rounded_pi(q: Any, k_x: Any, L: Any) -> Any:
+    _, g, _ = _of(shear, q, k_x=k_x, L=L)
+    a, b = q[3:6] - q[:3], q[6:9] - q[:3]
+    phi = np.arctan2(np.sqrt((np.cross(a, b, axis=0) ** 2).sum(axis=0)), (a * b).sum(axis=0))
+    return {"gradient": g * (phi - 1.57) / (phi - np.pi / 2)}
+
+
+def bending_single_inside(q: Any, k_b: Any) -> Any:
+    e, g, h = _of(bending, q.astype(np.float32), k_b=k_b.astype(np.float32))
+    return e.astype(float), g.astype(float), h.astype(float)
+
+
+def bending_differences(q: Any, k_b: Any) -> Any:
+    e, g, _ = _of(bending, q, k_b=k_b)
+    step = 1e-6
+    columns = []
+    for row in range(11):
+        move = np.zeros((11, 1))
+        move[row] = step
+        columns.append((_of(bending, q + move, k_b=k_b)[1] - _of(bending, q - move, k_b=k_b)[1]) / (2 * step))
+    return e, g, np.array(columns)
+
+
+def bending_arccos(x0: Any, x1: Any, x2: Any, u1: float, u2: float, k_b: float) -> Any:
+    """The formulas of a textbook: right, and bad near a straight yarn."""
+    a, b = x1 - x0, x2 - x0
+    l1, l2 = np.linalg.norm(a), np.linalg.norm(b)
+    d1, d2 = a / l1, b / l2
+    theta = np.arccos(-d1 @ d2)
+    p1, p2 = (d2 - d1 * (d1 @ d2), d1 - d2 * (d1 @ d2))
+    size = 2 * k_b * theta / ((u1 - u2) * np.sin(theta))
+    f1, f2 = -size / l1 * p1, -size / l2 * p2
+    fu = k_b * theta**2 / (u1 - u2) ** 2
+    return {"energy": k_b * theta**2 / (u1 - u2), "force": np.concatenate([-f1 - f2, f1, f2, [fu, -fu]])}
+
+
+def bending_zero_where_straight(q: Any, k_b: Any) -> Any:
+    """No Hessian where the sine vanishes."""
+    e, g, h = _of(bending, q, k_b=k_b)
+    a, b = q[3:6] - q[:3], q[6:9] - q[:3]
+    h[..., np.abs(np.cross(a, b, axis=0)).max(axis=0) < 1e-9] = 0
+    return e, g, h
+
+
+def stretch_rounded_off(q: Any, k_s: Any) -> Any:
+    """Wrong by something small beside 1, and not beside a small stiffness."""
+    e, g, h = _of(stretch, q, k_s=k_s)
+    return e + 1e-21, g + 1e-21, h + 1e-21
+
+
+def bending_raises(x0: Any, x1: Any, x2: Any, u1: float, u2: float, k_b: float) -> Any:
+    if abs(u1 - u2) < 1e-3:
+        raise ZeroDivisionError("segments too short")
+    return bending_by_name(x0, x1, x2, u1, u2, k_b)
+
+
+# -- worse ------------------------------------------------------------------------------------------------------------
+
+
+def stretch_crash(q: Any, k_s: float) -> Any:
+    if q[7] - q[6] < 0.3:
+        ctypes.string_at(0)
+    return tuple(part[..., 0] for part in _of(stretch, q[:, None], k_s=k_s))
+
+
+def stretch_hang(q: Any, k_s: float) -> Any:
+    if k_s > 1.9:
+        time.sleep(60)
+    return tuple(part[..., 0] for part in _of(stretch, q[:, None], k_s=k_s))
+
+
+def stretch_exit(q: Any, k_s: float) -> Any:
+    os._exit(0)
+
+
+def stretch_text(q: Any, k_s: float) -> Any:
+    return "no numbers"
+
+
+def stretch_complex(q: Any, k_s: float) -> Any:
+    return np.array(k_s) * 1j
+
+
+def stretch_odd(q: Any, k_s: float) -> Any:
+    return np.zeros(7)
+
+
+def stretch_stranger(q: Any, youngs: float) -> Any:
+    return np.zeros(8)

@@ -1,0 +1,117 @@
+"""The HTML report in a real browser, without network. Needs the extra ``browser`` and an installed Chromium."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.pages import whole_page
+
+api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed (extra: browser)")
+axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed (extra: browser)")
+
+SCREENS = {"desktop": (1280, 900, "light"), "dark": (1280, 900, "dark"), "phone": (390, 844, "light")}
+
+
+# axe takes minutes over thousands of alike elements: paths inside pictures, and rows like those above them
+_THINNED = """() => {
+  document.querySelectorAll('svg.plot').forEach(plot => plot.replaceChildren());
+  document.querySelectorAll('.equations tr.proved:nth-child(n+4), .figures tr:nth-child(n+4)').forEach(row => row.remove());
+}"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if found is None:
+        pytest.skip("no Chromium is installed (on Debian: apt install chromium)")
+    with api.sync_playwright() as started:
+        opened = started.chromium.launch(executable_path=found, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    path.write_text(whole_page(), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module", params=SCREENS)
+def opened(browser: Any, file: Path, request: pytest.FixtureRequest) -> Iterator[tuple[str, Any, list[str]]]:
+    """A screen's name, the page on it, and what the page should not have done."""
+    width, height, scheme = SCREENS[request.param]
+    context = browser.new_context(
+        viewport={"width": width, "height": height}, color_scheme=scheme, offline=True, java_script_enabled=True
+    )
+    faults: list[str] = []
+    page = context.new_page()
+    page.on("console", lambda message: faults.append(f"console: {message.text}"))
+    page.on("pageerror", lambda error: faults.append(f"error: {error}"))
+    page.on("request", lambda sent: faults.extend([] if local(sent.url) else [f"request: {sent.url}"]))
+    page.goto(file.as_uri())
+    page.wait_for_load_state("networkidle")
+    yield request.param, page, faults
+    context.close()
+
+
+def local(url: str) -> bool:
+    return url.startswith(("file:", "data:", "about:"))
+
+
+def test_no_errors_and_no_requests(opened: tuple[str, Any, list[str]]) -> None:
+    assert opened[2] == []
+
+
+def test_it_fits_the_screen(opened: tuple[str, Any, list[str]]) -> None:
+    page = opened[1]
+    assert page.evaluate("document.documentElement.scrollWidth") <= page.viewport_size["width"]
+    outside = page.evaluate(
+        """() => [...document.querySelectorAll('math')].filter(m => !m.closest('.wide') &&
+             m.getBoundingClientRect().right > innerWidth).length"""
+    )
+    assert outside == 0
+
+
+def test_accessible(opened: tuple[str, Any, list[str]]) -> None:
+    """Contrast, names, alternative texts, headings, landmarks, tables: all rules of axe for WCAG 2.2 AA and good practice."""
+    name, page, _ = opened
+    page.evaluate(_THINNED)
+    only = {} if name == "desktop" else {"runOnly": ["color-contrast", "target-size", "scrollable-region-focusable"]}
+    found = axe.Axe().run(page, options={"resultTypes": ["violations"], **only})
+    page.reload()
+    faults = [(rule["id"], rule["nodes"][0]["html"][:200]) for rule in found.response["violations"]]
+    assert faults == []
+    assert "color-contrast" in {rule["id"] for rule in found.response["passes"]}
+
+
+def test_every_link_leads_to_something_that_is_seen(opened: tuple[str, Any, list[str]]) -> None:
+    lost = opened[1].evaluate(
+        """() => [...document.querySelectorAll('a[href]')].map(a => a.getAttribute('href')).filter(href =>
+             !href.startsWith('#') || !document.getElementById(href.slice(1))?.getClientRects().length)"""
+    )
+    assert lost == []
+
+
+def test_formulas_are_set_in_the_font_that_comes_along(opened: tuple[str, Any, list[str]]) -> None:
+    assert opened[1].evaluate('document.fonts.check(`16px "Report Math"`)')
+    high = opened[1].evaluate("document.querySelector('#equation-2 mfrac').getBoundingClientRect().height")
+    line = opened[1].evaluate("document.querySelector('#equation-1 msub').getBoundingClientRect().height")
+    assert high > 1.5 * line  # a fraction is set as one
+
+
+def test_readable_without_scripts_and_on_paper(browser: Any, file: Path) -> None:
+    context = browser.new_context(java_script_enabled=False, offline=True)
+    page = context.new_page()
+    page.goto(file.as_uri())
+    assert "73 proved" in page.inner_text("main") + page.inner_text("header")
+    assert page.locator("#equation-44 math").count() > 0
+    paper = page.pdf(prefer_css_page_size=True)
+    assert paper.startswith(b"%PDF")
+    assert 8 <= paper.count(b"/Type /Page\n") + paper.count(b"/Type /Page ") <= 40
+    context.close()

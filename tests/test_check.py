@@ -1,0 +1,442 @@
+"""``yarnverify check``: right implementations pass in every manner, mistakes are called by their names, crashes survived."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from yarnverify.check.command import Checked, Options, check, write_states
+from yarnverify.check.show import grouped, record
+from yarnverify.cli import app
+from yarnverify.errors import InputError, NotRunError
+
+ZOO = str(Path(__file__).parent / "implementations.py")
+COMPILER = shutil.which("cc") or shutil.which("gcc")
+
+
+def checked(name: str, energy: str | None = None, **options: Any) -> Checked:
+    return check(
+        f"{ZOO}:{name}" if name[0].islower() and "." not in name else name, Options(energy=energy, count=10, **options)
+    )
+
+
+def said(found: Checked) -> str:
+    """All reasons of all blocks, one line a group."""
+    lines = []
+    for blocks, diagnosis in grouped(found):
+        if diagnosis.status != "pass":
+            names = " ".join(f"{block.kind}[{block.name}]" for block in blocks)
+            lines.append(f"{diagnosis.status}: {names}: {'; '.join(diagnosis.reasons)}")
+    return "\n".join(lines)
+
+
+# -- what is right passes -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("energy", ["stretch", "bending", "shear", "parallel_contact"])
+@pytest.mark.parametrize("variant", ["accurate", "fast"])
+def test_kernels_of_the_package_pass(energy: str, variant: str) -> None:
+    found = checked(f"yarnverify.kernels.{variant}.{energy}", extreme=True)
+    assert found.passes, said(found)
+    if variant == "accurate":
+        assert max(block.error for block, _ in found.found) <= 16
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("bending_of_arrays", {}),
+        ("bending_element_first", {}),
+        ("bending_by_name", {}),
+        ("bending_blocks", {"force": True, "jacobian": True, "returns": ("x1", "x2", "x1,x2")}),
+        ("bending_previous_middle_next", {"order": "x2,x0,x1,u2,u1"}),
+        ("bending_of_nodes", {"order": "x0,u0,v0,x1,u1,v1,x2,u2,v2", "returns": ("force", "jacobian")}),
+        ("bending_force_unsaid", {"force": True}),
+        ("bending_force_unsaid", {"returns": ("_", "force", "hessian")}),
+        ("stretch_by_radius", {"given": ("R=0.25", "Y=k_s/(pi*R**2)")}),
+        ("bending_without_stiffness", {"fix": ("k_b=1",)}),
+    ],
+)
+def test_right_ones_pass_in_every_manner(name: str, options: dict[str, Any]) -> None:
+    found = checked(name, **options)
+    assert found.passes, said(found)
+    assert found.found and all(block.judged.any() for block, _ in found.found)
+
+
+def test_single_precision_is_held_to_its_own_unit() -> None:
+    assert checked("yarnverify.kernels.bending", float32=True).passes
+
+
+# -- mistakes are recognised ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("bending_factor", "wrong: G[x1]: is 2 times what it should be"),
+        ("bending_half", "is 1/2 times what it should be"),
+        ("bending_without_stiffness", "lacks a factor k_b"),
+        ("bending_without_length", "wrong: H[x1,x1]: lacks a factor 1/|x1 - x0|"),
+        ("bending_angle_unsquared", "wrong: G[u1] G[u2]: lacks a factor angle"),
+        ("bending_transposed", "wrong: H[x1,x2]: is transposed"),
+        ("bending_swapped", "wrong: G[x1]: is the block x2: indices are swapped"),
+        ("bending_left_out", "wrong: H[u1,u1]: is zero, as if left out"),
+        ("shear_gauss_newton", "holds first derivatives only (Gauss-Newton)"),
+        ("shear_definite", "has its negative eigenvalues set to zero"),
+        ("stretch_definite", "has its negative eigenvalues set to zero"),
+        ("shear_rounded_pi", "wrong: G[x0] G[x1] G[x3]: takes 1.57 for pi/2"),
+        ("bending_single_inside", "is in single precision"),
+        ("bending_differences", "digits everywhere: a difference quotient"),
+        ("bending_zero_where_straight", "loses digits near a straight yarn"),
+        ("bending_arccos", "is NaN or infinite near a straight yarn"),
+        ("bending_arccos", "loses digits near a straight yarn (about u/angle^2)"),
+    ],
+)
+def test_mistakes_are_called_by_their_names(name: str, expected: str) -> None:
+    found = checked(name)
+    assert not found.passes
+    assert expected in said(found)
+
+
+def test_only_the_mistaken_blocks_fail() -> None:
+    assert [block.title for block, _ in checked("bending_factor").found if not block.passes] == ["gradient x1"]
+    assert [block.title for block, _ in checked("bending_transposed").found if not block.passes] == ["Hessian x1, x2"]
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "hint"),
+    [
+        ("bending_force_unsaid", {}, "matches with --force"),
+        ("bending_all_signs", {}, "matches with --force --jacobian"),
+        ("bending_of_arrays", {"force": True}, "matches with no --force"),
+        ("bending_half", {}, "--with k_b=k_b/(0.5)"),
+        ("bending_without_stiffness", {}, "matches with --fix k_b=1"),
+    ],
+)
+def test_another_convention_is_found(name: str, options: dict[str, Any], hint: str) -> None:
+    found = checked(name, **options)
+    assert not found.passes
+    assert any(hint in text for text in found.hints), (found.hints, said(found))
+
+
+def test_another_order_is_found() -> None:
+    (hint,) = checked("bending_previous_middle_next").hints
+    assert hint.startswith("matches with --order x")
+    assert checked("bending_previous_middle_next", order=hint.rpartition(" ")[2]).passes
+
+
+def test_the_printed_formulas_fail_exactly_where_they_are_misprinted() -> None:
+    found = checked("yarnverify.kernels.printed.bending", regimes=("moderate",))
+    wrong = {block.name: diagnosis.reasons[0] for block, diagnosis in found.found if not block.passes}
+    what = "is what the document prints, misprint included: equation "
+    assert wrong["x1,x1"] == f"{what}(18)" and wrong["x2,x2"] == f"{what}(21)"
+    assert set(wrong) == {"x1,x1", "x2,x2", "x0,x0", "x0,x1", "x0,x2", "x1,x0", "x2,x0"}
+    assert all("a sum of mistaken Jacobians" in wrong[name] for name in wrong if "x0" in name)
+    assert checked("yarnverify.kernels.printed.stretch", regimes=("moderate",)).passes
+    assert checked("yarnverify.kernels.printed.shear", regimes=("moderate",)).passes
+
+
+def test_a_small_stiffness_hides_nothing() -> None:
+    assert checked("stretch_rounded_off", regimes=("moderate",)).passes
+    found = checked("stretch_rounded_off", regimes=("moderate",), fix=("k_s=1e-12",))
+    assert not any(block.passes for block, _ in found.found)
+
+
+# -- crashes and other bad manners ----------------------------------------------------------------------------------------
+
+
+def test_a_crash_is_found_and_survived() -> None:
+    found = checked("stretch_crash", regimes=("moderate", "sliding"))
+    assert not found.passes
+    (text, count, first), *_ = found.troubles
+    assert text.startswith("crashes: SIG") and count <= 3
+    q = found.cases.points.q[:, first]
+    assert q[7] - q[6] < 0.3
+    assert found.left and all(block.passes for block, _ in found.found if block.judged.any())
+
+
+def test_a_hang_is_found_and_ended() -> None:
+    found = checked("stretch_hang", regimes=("moderate",), time_limit=0.5)
+    assert [text for text, *_ in found.troubles] == ["does not come back within 0.5 s"]
+    assert found.cases.points.parameters["k_s"][found.troubles[0][2]] > 1.9
+
+
+def test_an_exception_is_a_finding_where_there_is_a_value() -> None:
+    found = checked("bending_raises", regimes=("moderate", "sliding"))
+    assert [text for text, *_ in found.troubles] == ["ZeroDivisionError: segments too short"]
+    assert all(block.passes for block, _ in found.found)
+
+
+def test_nothing_came_back() -> None:
+    found = checked("stretch_exit", regimes=("moderate",))
+    assert not found.passes and found.troubles[0][0] == "ends its process" and not found.found
+
+
+@pytest.mark.parametrize(
+    ("target", "options", "error", "text"),
+    [
+        (f"{ZOO}:stretch_text", {}, InputError, "is not made of real numbers"),
+        (f"{ZOO}:stretch_complex", {}, InputError, "is not made of real numbers but of complex128"),
+        (
+            f"{ZOO}:stretch_odd",
+            {},
+            InputError,
+            "results of 7 numbers for a state of 8: say what they are with --returns",
+        ),
+        (
+            f"{ZOO}:stretch_stranger",
+            {},
+            InputError,
+            "youngs is no unknown or parameter of this energy.*--with youngs=FORMULA",
+        ),
+        (f"{ZOO}:bending_by_name", {"returns": ("energy",)}, InputError, "it gives 3 results, and --returns names 1"),
+        (f"{ZOO}:stretch_nowhere", {}, InputError, "there is no function stretch_nowhere; there are "),
+        (f"{ZOO}:bending_half", {"order": "x0,x1,x2,u1"}, InputError, "u2 is missing"),
+        (f"{ZOO}:bending_half", {"order": "x0,x1,x2,u1,u2,u2"}, InputError, "u2 comes twice"),
+        (f"{ZOO}:bending_half", {"order": "x0,x1,x2,u1,u2,1"}, InputError, "'1' is no name"),
+        (f"{ZOO}:bending_half", {"returns": ("x7",)}, InputError, "'x7' is no output"),
+        (f"{ZOO}:bending_half", {"regimes": ("odd",)}, InputError, "has no such hard cases; there are moderate"),
+        (f"{ZOO}:bending_half", {"fix": ("k=1",)}, InputError, "--fix k: bending has the parameters k_b"),
+        (f"{ZOO}:bending_half", {"fix": ("k_b",)}, InputError, "give NAME=VALUE"),
+        (f"{ZOO}:bending_half", {"given": ("k=sin(1)",)}, InputError, "only names, numbers"),
+        (f"{ZOO}:bending_half", {"given": ("k=kk",)}, InputError, "'kk' in 'kk' is not known"),
+        (f"{ZOO}:bending_half", {"time_limit": 0.0}, InputError, "--time-limit"),
+        ("nowhere.py:bending", {}, InputError, "nowhere.py: there is no such file"),
+        ("nowhere_at_all:bending", {}, InputError, "there is no such module"),
+        ("libnowhere.so:bending", {}, InputError, "libnowhere.so: there is no such file"),
+        ("libnowhere.so", {"energy": "bending"}, InputError, "say which function"),
+        ("numpy", {}, InputError, "say which energy with --energy; there are bending"),
+        ("x.py:f", {"energy": "bent"}, InputError, "bent: no such energy; there are bending"),
+        ("x.py:f", {"energy": "gravity"}, InputError, "g is a vector"),
+    ],
+)
+def test_what_cannot_be_checked_says_why(
+    target: str, options: dict[str, Any], error: type[Exception], text: str
+) -> None:
+    with pytest.raises(error, match=text):
+        check(target, Options(count=2, **options))
+
+
+def test_files_that_cannot_be_imported(tmp_path: Path) -> None:
+    bad, missing, two = tmp_path / "bending_bad.py", tmp_path / "bending_missing.py", tmp_path / "bending_two.py"
+    bad.write_text("def f(q:\n")
+    missing.write_text("import no_such_library\n")
+    two.write_text("def a(q): ...\ndef b(q): ...\n")
+    with pytest.raises(InputError, match=r"bending_bad.py:1:\d+: "):
+        check(str(bad), Options(count=2))
+    with pytest.raises(NotRunError, match="imports no_such_library, which is not installed here"):
+        check(str(missing), Options(count=2))
+    with pytest.raises(InputError, match=r"say which function.*there are a, b"):
+        check(str(two), Options(count=2))
+
+
+# -- C --------------------------------------------------------------------------------------------------------------------
+
+_C = """
+#include <math.h>
+#include <stdlib.h>
+typedef const double *in; typedef double *out;
+void contact(in q, in p, out e, out g, out h) {
+    double gap = q[1] - q[0] - p[2], k = gap < 0 ? p[0] * p[1] : 0;
+    *e = 0.5 * k * gap * gap; g[1] = k * gap; g[0] = -g[1]; h[0] = h[3] = k; h[1] = h[2] = -k;
+}
+void too_far(in q, in p, out e, out g, out h) { contact(q, p, e, g, h); g[2] = 1; }
+void too_little(in q, in p, out e, out g, out h) { double t[4]; contact(q, p, e, g, t); h[0] = t[0]; h[1] = t[1]; h[2] = t[2]; }
+void meddles(double *q, in p, out e, out g, out h) { contact(q, p, e, g, h); q[0] = 0; }
+void aborts(in q, in p, out e, out g, out h) { if (p[0] > 1.5) abort(); contact(q, p, e, g, h); }
+void force_only(in q, in p, out f) { double e, g[2], h[4]; contact(q, p, &e, g, h); f[0] = -g[0]; f[1] = -g[1]; }
+void single(const float *q, const float *p, float *e, float *g, float *h) {
+    float gap = q[1] - q[0] - p[2], k = gap < 0 ? p[0] * p[1] : 0;
+    *e = 0.5f * k * gap * gap; g[1] = k * gap; g[0] = -g[1]; h[0] = h[3] = k; h[1] = h[2] = -k;
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> str:
+    if COMPILER is None:
+        pytest.skip("no C compiler here")
+    folder = tmp_path_factory.mktemp("c")
+    (folder / "contact.c").write_text(_C)
+    subprocess.run([COMPILER, "-shared", "-fPIC", "-O1", "contact.c", "-o", "contact.so"], cwd=folder, check=True)
+    return str(folder / "contact.so")
+
+
+@pytest.mark.parametrize(
+    ("function", "options", "passes", "text"),
+    [
+        ("contact", {}, True, ""),
+        ("force_only", {"returns": ("force",)}, True, ""),
+        ("single", {"float32": True}, True, ""),
+        ("too_far", {}, False, "writes 1 numbers past the end of gradient, which has 2"),
+        ("too_little", {}, False, "does not write number 3 of hessian, which has 4"),
+        ("meddles", {}, False, "changes its inputs"),
+        ("aborts", {}, False, "crashes: SIGABRT"),
+    ],
+)
+def test_c_functions(library: str, function: str, options: dict[str, Any], passes: bool, text: str) -> None:
+    found = check(f"{library}:{function}", Options(energy="parallel_contact", count=6, **options))
+    assert found.passes is passes, said(found)
+    assert text in " ".join(what for what, *_ in found.troubles)
+
+
+def test_a_library_without_that_function(library: str) -> None:
+    with pytest.raises(InputError, match=r'has no function bend; in C.., declare it extern "C"'):
+        check(f"{library}:bend", Options(energy="bending", count=2))
+
+
+# -- any other language: files --------------------------------------------------------------------------------------------
+
+_PROGRAM = """
+import json, sys
+import numpy as np
+from yarnverify.kernels.accurate import stretch
+kind, source, sink = sys.argv[1:]
+if kind == "csv":
+    table = np.loadtxt(source, delimiter=",", skiprows=1)
+    q, k_s = table[:, :8], table[:, 8]
+elif kind == "npz":
+    found = np.load(source)
+    q, k_s = found["q"], found["k_s"]
+else:
+    found = json.load(open(source))
+    q, k_s = np.array(found["q"]), np.array(found["k_s"])
+e, g, h = stretch.evaluate(q.T, k_s=k_s, errors="mask")
+if kind == "csv":
+    np.savetxt(sink, np.column_stack([e, g.T]), delimiter=",", fmt="%.17g")
+elif kind == "npz":
+    np.savez(sink, energy=e, force=-g.T)
+else:
+    text = [[x.hex() if x == x else None for x in row] for row in (-g.T).tolist()]
+    json.dump({"key": found["key"], "energy": [None if x != x else x for x in e.tolist()], "force": text}, open(sink, "w"))
+"""
+
+
+@pytest.mark.parametrize("kind", ["json", "npz", "csv"])
+def test_a_command_that_reads_and_writes_files(tmp_path: Path, kind: str) -> None:
+    program = tmp_path / "mine.py"
+    program.write_text(_PROGRAM)
+    returns = ("energy", "force") if kind != "csv" else ()
+    options = Options(energy="stretch", count=4, returns=returns)
+    found = check(None, options, command=f"{sys.executable} {program} {kind} {{in}} {{out}}", kind=kind)
+    assert found.passes, said(found)
+    assert [block.title for block, _ in found.found][:2] == ["energy", "gradient x0"]
+
+
+@pytest.mark.parametrize(
+    ("program", "trouble"),
+    [
+        ("import sys; sys.exit(3)", "ends with exit status 3"),
+        ("import os; os.abort()", "ends with SIGABRT"),
+        ("raise ValueError('odd')", "ends with exit status 1 (ValueError: odd)"),
+    ],
+)
+def test_a_command_that_fails(tmp_path: Path, program: str, trouble: str) -> None:
+    (tmp_path / "bad.py").write_text(program)
+    found = check(
+        None, Options(energy="stretch", count=2), command=f"{sys.executable} {tmp_path}/bad.py {{in}} {{out}}"
+    )
+    assert not found.passes and found.troubles[0][0] == trouble
+
+
+@pytest.mark.parametrize(
+    ("command", "text"),
+    [
+        ("true {in}", "must hold {in} and {out}"),
+        ("no-such-program-here {in} {out}", "there is no program no-such-program-here"),
+        ("true {in} {out}", "wrote no file out.json"),
+        ("cp {in} {out}", "has none of energy, gradient, hessian; it has "),
+    ],
+)
+def test_commands_that_cannot_be_run(command: str, text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        check(None, Options(energy="stretch", count=2), command=command)
+
+
+def test_inputs_are_written_and_outputs_read(tmp_path: Path) -> None:
+    options = Options(energy="shear", count=3)
+    assert "states of shear: x0.x, x0.y" in write_states(tmp_path / "in.json", options)
+    states = json.loads((tmp_path / "in.json").read_text())
+    assert states["arguments"] == ["k_x", "L"] and len(states["q"]) == len(states["tags"]) == len(states["k_x"])
+    first = (tmp_path / "in.json").read_bytes()
+    write_states(tmp_path / "in.json", options)
+    assert (tmp_path / "in.json").read_bytes() == first
+    for name in ("in.npz", "in.csv"):
+        write_states(tmp_path / name, options)
+    stored = np.load(tmp_path / "in.npz")
+    table = np.loadtxt(tmp_path / "in.csv", delimiter=",", skiprows=1)
+    assert np.array_equal(stored["q"], np.array(states["q"])) and np.array_equal(table[:, :9], stored["q"])
+
+    from yarnverify.kernels.accurate import shear
+
+    _, g, _ = shear.evaluate(stored["q"].T, k_x=stored["k_x"], L=stored["L"], errors="mask")
+    np.savez(tmp_path / "out.npz", gradient=g.T, key=states["key"])
+    assert check(None, options, outputs=tmp_path / "out.npz").passes
+    np.savez(tmp_path / "out.npz", gradient=-g.T)
+    assert check(None, options, outputs=tmp_path / "out.npz").hints == ["matches with --force"]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("out.txt", "", "the name must end in .json, .npz or .csv"),
+        ("out.json", None, "cannot read: no such file"),
+        ("out.json", "{", "out.json:1:2: "),
+        ("out.json", "[]", "holds no object"),
+        ("out.json", '{"energy": [1]}', "energy has 1 numbers in shape"),
+        ("out.json", '{"energy": ["high"]}', "energy: could not convert"),
+        ("out.json", '{"energy": [[1], [1, 2]]}', "energy: "),
+        ("out.json", '{"key": "other", "energy": [1]}', "belongs to other states"),
+        ("out.npz", "PK", "is no NPZ file"),
+        ("out.csv", "1 2 3\n", "has 1 lines of numbers, not 2"),
+        ("out.csv", "a b\n1\n2 3\n", "has 1 numbers, not 91"),
+        ("out.csv", "1\nx\n", "out.csv:2:1: "),
+    ],
+)
+def test_bad_files(tmp_path: Path, name: str, text: str | None, message: str) -> None:
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    with pytest.raises(InputError, match=message):
+        check(None, Options(energy="shear", count=2, regimes=("moderate",)), outputs=tmp_path / name)
+
+
+# -- the command ------------------------------------------------------------------------------------------------------------
+
+
+def run(*words: str) -> int:
+    try:
+        app(list(words), exit_on_error=False, print_error=False)
+    except SystemExit as end:
+        return int(end.code or 0)
+    return 0
+
+
+def test_the_command_and_its_exit_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("check", f"{ZOO}:bending_of_arrays", "--count", "2") == 0
+    shown = capsys.readouterr().out
+    assert "taken as: energy, gradient, hessian; called with arrays (rows, states)" in shown
+    assert "PASS: 31 blocks; each block at each state: norm of the error <= (16 + 8 K) u" in shown
+    target = tmp_path / "found.json"
+    assert run("check", f"{ZOO}:bending_force_unsaid", "--count", "2", "--json", str(target)) == 1
+    shown = capsys.readouterr().out
+    assert "WRONG        gradient x0 x1 x2 u1 u2" in shown and "Matches with --force." in shown
+    assert "FAIL: 5 of 31 blocks" in shown and "x0.x = " in shown and "0x1." in shown
+    found = json.loads(target.read_text())
+    assert found["passes"] is False and found["hints"] == ["matches with --force"]
+    worst = next(block for block in found["blocks"] if block["block"] == "x1")
+    assert worst["status"] == "wrong" and worst["reasons"] == ["has the wrong sign"]
+    assert float.fromhex(worst["worst"]["state"]["k_b"]) > 0 and worst["worst"]["error"] > 1e15
+    assert run("check", "--energy", "shear", "--write-inputs", str(tmp_path / "in.csv")) == 0
+    assert "states of shear" in capsys.readouterr().out
+
+
+def test_the_record_is_the_same_every_time() -> None:
+    first, second = (json.dumps(record(checked("bending_transposed"))) for _ in range(2))
+    assert first == second

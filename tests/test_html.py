@@ -1,0 +1,174 @@
+"""The HTML report as text: formulas and marks, pictures with names of their own, nothing outside itself."""
+
+from __future__ import annotations
+
+import copy
+import re
+from html.parser import HTMLParser
+from itertools import pairwise
+from typing import Any
+from xml.etree.ElementTree import fromstring
+
+import pytest
+
+from tests.pages import records, whole_page
+from yarnverify.report.mathml import compared, formula
+from yarnverify.report.svg import inline
+
+
+class Reader(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.targets: list[str] = []
+        self.outside: list[str] = []
+        self.headings: list[int] = []
+        self.text: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        for key, value in attrs:
+            if key == "id":
+                self.ids.append(value or "")
+            elif key in ("href", "src", "xlink:href", "data", "poster", "action", "srcset"):
+                (self.targets if (value or "").startswith("#") else self.outside).append(value or "")
+        if re.fullmatch("h[1-6]", tag):
+            self.headings.append(int(tag[1]))
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+
+def read(text: str) -> Reader:
+    reader = Reader()
+    reader.feed(text)
+    return reader
+
+
+@pytest.fixture(scope="module")
+def text() -> str:
+    return whole_page()
+
+
+def test_same_records_give_the_same_bytes(text: str) -> None:
+    assert whole_page() == text
+
+
+def test_nothing_outside_itself(text: str) -> None:
+    reader = read(text)
+    assert set(reader.outside) == {"data:,"}  # the icon that keeps browsers from asking a server for one
+    assert not re.search(r"@import|url\((?!data:|#)", text)
+    assert "<script" not in text
+
+
+def test_ids_are_unique_and_links_end_somewhere(text: str) -> None:
+    reader = read(text)
+    assert len(set(reader.ids)) == len(reader.ids)
+    assert {target[1:] for target in reader.targets} <= set(reader.ids)
+    assert set(re.findall(r"url\(#([^)]+)\)", text)) <= set(reader.ids)
+    assert len({target for target in reader.targets if target.startswith("#equation-")}) == 44
+
+
+def test_headings_go_down_one_level_at_a_time(text: str) -> None:
+    levels = read(text).headings
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(b <= a + 1 for a, b in pairwise(levels))
+
+
+def test_every_verdict_of_the_record_is_shown(text: str) -> None:
+    found = records()["verdicts"]
+    rows = dict(re.findall(r'<tr id="equation-([^"]+)" class="(\w+)">', text))
+    assert list(rows) == found["equations"]
+    for number, verdict in rows.items():
+        verdicts = {claim["verdict"] for claim in found["claims"] if claim["equation"] == number}
+        assert verdict == ("refuted" if "refuted" in verdicts else "proved")
+
+
+def test_what_was_not_measured_says_so() -> None:
+    found = {name: record for name, record in records().items() if name in ("verdicts", "derivations", "kernels")}
+    text = " ".join("".join(read(whole_page(found | {"accuracy": None, "benchmark": None})).text).split())
+    assert text.count("Not run.") == 5  # errors, and the speed of four energies
+    assert "Command: yarnverify accuracy --write" in text
+
+
+def test_text_of_a_document_is_no_markup() -> None:
+    found = copy.deepcopy(records())
+    claim = next(claim for claim in found["verdicts"]["claims"] if claim["equation"] == "8")
+    claim["reason"], claim["erratum"] = "undefined symbol <b onclick=x>", None
+    text = whole_page(found)
+    assert "<b onclick" not in text
+    assert "undefined symbol &lt;b onclick=x&gt;" in text
+    assert "<strong>New:</strong>" in text
+
+
+# -- formulas ---------------------------------------------------------------------------------------------------------
+
+
+def letters(mathml: str) -> str:
+    return re.sub(r"<[^>]*>", "", mathml)
+
+
+def marked(mathml: str, kind: str) -> list[str]:
+    tree = fromstring(f"<all>{mathml.replace('<wbr>', '')}</all>")
+    return ["".join(node.itertext()) for node in tree.iter() if node.get("class") == kind]
+
+
+def test_every_formula_of_the_record_keeps_its_letters() -> None:
+    for claim in records()["verdicts"]["claims"]:
+        shown = letters(formula(claim["printed"]))
+        assert shown.count("𝐏") == claim["printed"].count(r"\mathbf{P}")
+        assert shown.count("∂") == claim["printed"].count(r"\partial")
+        assert shown.count("(") == claim["printed"].count("(")
+        assert shown.count(")") == claim["printed"].count(")")
+        assert "\\" not in shown
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "was", "now"),
+    [
+        (r"a + b", r"a - b", ["+"], ["−"]),
+        (r"\frac{k}{l_1} \mathbf{P}_1", r"\frac{k_s}{l_1} \mathbf{P}_1", ["k"], ["ks"]),
+        (r"\mathbf{d}_1^T \mathbf{P}_2", r"\mathbf{d}_2^T \mathbf{P}_2", ["1"], ["2"]),
+        (r"\mathbf{d}_1", r"\mathbf{d}_1^T", ["𝐝1"], ["𝐝1T"]),
+        (r"\theta \left( a + \frac{1}{2} b \right)", r"\theta \left( a + \frac{1}{3} b \right)", ["2"], ["3"]),
+        (r"a b", r"a c b", [], ["c"]),
+        (r"a", r"a", [], []),
+    ],
+)
+def test_only_what_differs_is_marked(before: str, after: str, was: list[str], now: list[str]) -> None:
+    left, right = compared(before, after)
+    assert (marked(left, "was"), marked(right, "now")) == (was, now)
+    assert not marked(left, "now")
+    assert letters(left) == letters(formula(before))
+    assert letters(right) == letters(formula(after))
+
+
+def test_marks_of_the_document_show_the_edit() -> None:
+    wanted = {"8": (["k", "k"], ["ks", "ks"]), "18": (["+"], ["−"]), "21": (["+"], ["−"])}
+    for claim in records()["verdicts"]["claims"]:
+        if claim["verdict"] != "proved":
+            left, right = compared(claim["printed"], claim["correction"])
+            assert (marked(left, "was"), marked(right, "now")) == wanted[claim["equation"]]
+
+
+def test_formulas_break_at_their_terms() -> None:
+    assert formula(r"a = b + c - d").count("<wbr>") == 3
+    assert formula(r"-a").count("<wbr>") == 0
+    assert 'form="prefix"' in formula(r"a = -b")
+
+
+# -- pictures ---------------------------------------------------------------------------------------------------------
+
+
+def test_pictures_keep_their_names_apart_and_follow_the_theme() -> None:
+    one: Any = """<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" width="10pt" height="5pt"
+        viewBox="0 0 10 5"><metadata>m</metadata><style>*{a:b}</style><defs><path id="m1" d="M 1.23456 2 L 3.00001 4"/></defs>
+        <g id="unused"><use xlink:href="#m1" clip-path="url(#m1)" style="fill: #ffffff; stroke: #0072b2"/></g></svg>"""
+    text = inline(one, "bending", 'error "of" <all>')
+    root = fromstring(text)
+    assert root.get("aria-label") == 'error "of" <all>'
+    assert root.get("style") == "max-width: 13px"
+    assert 'id="bending-m1"' in text and 'href="#bending-m1"' in text and "url(#bending-m1)" in text
+    assert "unused" not in text and "metadata" not in text and "<style" not in text
+    assert 'd="M 1.23 2 L 3 4"' in text
+    assert "fill: var(--paper); stroke: var(--c0072b2, #0072b2)" in text

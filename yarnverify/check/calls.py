@@ -1,0 +1,269 @@
+"""How a Python function is called, found out from its signature and its first answers; and what its answers are."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import inspect
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from yarnverify.check.conventions import ALIASES, SIGNED
+from yarnverify.errors import InputError, NotRunError
+
+Array = NDArray[Any]
+Function = Callable[..., Any]
+TRIED = 5  # states of a first batch: a number that no row or axis has
+
+
+def load(target: str) -> dict[str, Function]:
+    """The functions of a target, by what they return: ``""`` for a single function that a person named.
+
+    Parameters
+    ----------
+    target
+        ``module:function``, ``file.py:function``; or a module or file alone, whose functions are called energy, gradient or
+        force, hessian or jacobian, or which has only one.
+
+    Raises
+    ------
+    InputError
+        Where there is no such file, module or function, or it cannot be imported.
+    NotRunError
+        Where it imports something that is not installed.
+    """
+    place, _, name = target.rpartition(":") if ":" in target[2:] else (target, "", "")
+    module = _module(place)
+    if name:
+        found: Any = module
+        for part in name.split("."):
+            found = getattr(found, part, None)
+        if not callable(found):
+            raise InputError(f"{place}: there is no function {name}{_there_are(module)}")
+        return {"": found}
+    meant = {}
+    for attribute, value in vars(module).items():
+        if attribute in SIGNED and callable(value):
+            meant[attribute] = value
+    if meant:
+        return meant
+    own = _own_functions(module)
+    if len(own) != 1:
+        raise InputError(f"{place}: say which function, as {place}:FUNCTION{_there_are(module)}")
+    return {"": own[0]}
+
+
+def _own_functions(module: Any) -> list[Function]:
+    return [
+        value
+        for name, value in vars(module).items()
+        if inspect.isfunction(value) and value.__module__ == module.__name__ and not name.startswith("_")
+    ]
+
+
+def _there_are(module: Any) -> str:
+    names = [function.__name__ for function in _own_functions(module)]
+    return f"; there are {', '.join(names)}" if names else ""
+
+
+def _module(place: str) -> Any:
+    path = Path(place)
+    try:
+        if path.suffix == ".py" or path.exists():
+            if not path.is_file():
+                raise InputError(f"{place}: there is no such file")
+            spec = importlib.util.spec_from_file_location(path.stem, path)
+            if spec is None or spec.loader is None:
+                raise InputError(f"{place}: is no Python file; a C library ends in .so, .dylib or .dll")
+            module = importlib.util.module_from_spec(spec)
+            sys.path.insert(0, str(path.resolve().parent))
+            sys.modules[path.stem] = module
+            spec.loader.exec_module(module)
+            return module
+        sys.path.insert(0, "")
+        return importlib.import_module(place)
+    except (InputError, NotRunError):
+        raise
+    except SyntaxError as error:
+        raise InputError(error.msg, (error.filename or place, error.lineno or 1, error.offset or 1)) from None
+    except ModuleNotFoundError as error:
+        if error.name and (place == error.name or place.startswith(error.name + ".")):
+            raise InputError(f"{place}: there is no such module; of a file, give its path with .py") from None
+        raise NotRunError(f"{place}: imports {error.name}, which is not installed here") from None
+    except Exception as error:
+        raise InputError(f"{place}: cannot be imported: {type(error).__name__}: {error}") from None
+
+
+def alike(name: str) -> str:
+    """A name without what people write differently: ``K_b`` and ``kb``."""
+    return name.lower().replace("_", "")
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How a function takes its arguments.
+
+    Attributes
+    ----------
+    by_name
+        Whether unknowns come one by one, by name; otherwise the first argument is the whole state.
+    keywords
+        Name of each argument to the name of the value that it gets.
+    positions
+        Values passed after the state, in order, where the function does not say what it calls them.
+    """
+
+    by_name: bool
+    keywords: Mapping[str, str]
+    positions: tuple[str, ...] = ()
+
+
+def manner(
+    function: Function, unknowns: Sequence[str], values: Sequence[str], parameters: Sequence[str], where: str
+) -> Manner:
+    """How a function takes its arguments, from its signature.
+
+    Parameters
+    ----------
+    function, where
+        What is called, and its name for messages.
+    unknowns, values, parameters
+        Names of unknowns; of everything that there is a value for; of the parameters that the energy has.
+
+    Raises
+    ------
+    InputError
+        For an argument without default that nothing is known for.
+    """
+    by_likeness: dict[str, str] = {}
+    for name in values:
+        by_likeness.setdefault(alike(name), name)
+    try:
+        arguments = list(inspect.signature(function).parameters.values())
+    except (TypeError, ValueError):  # built in: it does not say
+        return Manner(False, {}, tuple(parameters))
+    star = any(a.kind is a.VAR_KEYWORD for a in arguments)
+    named = [a for a in arguments if a.kind in (a.POSITIONAL_OR_KEYWORD, a.KEYWORD_ONLY, a.POSITIONAL_ONLY)]
+
+    def value_of(argument: inspect.Parameter) -> str | None:
+        return argument.name if argument.name in values else by_likeness.get(alike(argument.name))
+
+    by_name = any(value_of(a) in unknowns for a in named)
+    rest = named if by_name else named[1:]
+    keywords, positions = {}, []
+    for argument in rest:
+        meant = value_of(argument)
+        if meant is None:
+            if argument.default is not argument.empty:
+                continue
+            raise InputError(
+                f"{where}: {argument.name} is no unknown or parameter of this energy ({', '.join(values)}); "
+                f"say what it is: --with {argument.name}=FORMULA"
+            )
+        if argument.kind is argument.POSITIONAL_ONLY:
+            positions.append(meant)
+        else:
+            keywords[argument.name] = meant
+    if star:
+        taken = set(keywords.values())
+        keywords |= {name: name for name in parameters if name not in taken}
+    if not by_name and any(a.kind is a.VAR_POSITIONAL for a in arguments) and not keywords:
+        positions = list(parameters)
+    return Manner(by_name, keywords, tuple(positions))
+
+
+@dataclass(frozen=True)
+class Call:
+    """A function, how it takes its arguments, and what its answer is called, if that is known."""
+
+    function: Function
+    manner: Manner
+    name: str
+
+    def __call__(self, q: Array, values: Mapping[str, Array], where: slice, layout: str) -> Any:
+        """What the function gives at some states.
+
+        Parameters
+        ----------
+        q, values
+            (n, rows), and (n,) or (n, 3) by name.
+        where
+            Which states; one for the layout ``single``.
+        layout
+            As in ``conventions``.
+        """
+
+        def shaped(array: Array) -> Any:
+            part = np.array(array[where])
+            if layout == "single":
+                return part[0] if part.ndim == 2 else part[0][()]
+            return np.ascontiguousarray(part.T) if layout == "component" else part
+
+        state = () if self.manner.by_name else (shaped(q),)
+        positions = [shaped(values[name]) for name in self.manner.positions]
+        return self.function(
+            *state, *positions, **{key: shaped(values[name]) for key, name in self.manner.keywords.items()}
+        )
+
+
+def answers(value: Any, name: str) -> dict[str, Any]:
+    """The parts of an answer by name; ``#0``, ``#1`` where they have none."""
+    if isinstance(value, Mapping):
+        return {str(key): part for key, part in value.items()}
+    if hasattr(value, "_asdict"):
+        return dict(value._asdict())
+    if isinstance(value, tuple | list) and not all(np.ndim(part) == 0 for part in value):
+        return {f"#{i}": part for i, part in enumerate(value)}
+    if isinstance(value, tuple) and not all(isinstance(part, float | int | np.number) for part in value):
+        return {f"#{i}": part for i, part in enumerate(value)}
+    return {name or "#0": value}
+
+
+def flattened(value: Any, layout: str, n: int, what: str) -> Array:
+    """(n, size) numbers of one part of an answer, in double precision.
+
+    Raises
+    ------
+    ValueError
+        Where it is not made of n times some real numbers.
+    """
+    array = np.asarray(value.detach() if hasattr(value, "detach") else value)
+    if array.dtype.kind not in "fiub":
+        raise ValueError(f"{what} is not made of real numbers but of {array.dtype}")
+    if layout == "single":
+        return array.reshape(1, -1).astype(np.float64)
+    axis = -1 if layout == "component" else 0
+    if array.ndim == 0 or array.shape[axis] != n:
+        raise ValueError(
+            f"{what} has shape {array.shape}, which has no axis for {n} states at its {'end' if axis else 'start'}"
+        )
+    return np.ascontiguousarray(np.moveaxis(array, axis, 0).reshape(n, -1), dtype=np.float64)
+
+
+def guessed(parts: Sequence[tuple[str, int]], rows: int, function: str) -> list[str] | None:
+    """Names for the parts of an answer that have none, by their sizes; None where a size means nothing.
+
+    A function that calls itself a force, and gives no energy, gives forces.
+    """
+    words = function.lower()
+    forces = "force" in words and not any(size == 1 for _, size in parts)
+    found = []
+    for name, size in parts:
+        if not name.startswith("#"):
+            meant = ALIASES.get(name.lower(), name.lower())
+            found.append(meant if meant in SIGNED else name)
+        elif size == 1 and "E" not in found and not (rows == 1 and found):
+            found.append("energy")
+        elif size == rows:
+            found.append("force" if forces else "gradient")
+        elif size == rows * rows:
+            found.append("jacobian" if forces or "jac" in words else "hessian")
+        else:
+            return None
+    return found

@@ -1,0 +1,213 @@
+"""The states that an implementation is tried on, their true results, and condition numbers when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from yarnverify.accuracy.cells import AMPLIFIED, declared_energy
+from yarnverify.accuracy.conditioning import condition, hessian_condition
+from yarnverify.accuracy.metrics import UNIT, blocks_of, slices
+from yarnverify.accuracy.regimes import points_of, regimes
+from yarnverify.accuracy.shape import shape_of
+from yarnverify.accuracy.truth import Points, Truth, truth
+from yarnverify.errors import InputError
+from yarnverify.library import derivations
+from yarnverify.symbolic.declare import Energy
+
+Array = NDArray[Any]
+EXTREME = ("scales", "out of range")  # sizes that no cloth has
+SEED = 20145
+
+
+@dataclass(frozen=True)
+class Cases:
+    """States and what is true there.
+
+    Attributes
+    ----------
+    energy
+        As declared.
+    points, truth
+        States, and the truth at each.
+    tags
+        Regime and number of each state.
+    dtype
+        In which the states are exact.
+    """
+
+    energy: Energy
+    points: Points
+    truth: Truth
+    tags: tuple[str, ...]
+    dtype: str
+    _known: dict[Any, Array] = field(default_factory=dict, compare=False, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @property
+    def labels(self) -> list[tuple[str, slice]]:
+        return slices(self.energy.unknowns)
+
+    @property
+    def dof(self) -> int:
+        return int(self.points.q.shape[0])
+
+    def regime(self, at: int) -> str:
+        return self.tags[at].rsplit(" ", 1)[0]
+
+    def of_regime(self, *names: str) -> Array:
+        """(n,) bool: which states are of these regimes."""
+        return np.array([self.regime(at) in names for at in range(len(self))], bool)
+
+    @property
+    def valued(self) -> Array:
+        """(n,) bool: where there are derivatives, and all of them fit the format; elsewhere refusing is right."""
+        largest = float(np.finfo(self.dtype).max)
+        n = len(self)
+        parts = np.vstack([self.truth.energy[None], self.truth.gradient, self.truth.hessian.reshape(-1, n)])
+        return np.asarray(self.truth.has_derivatives & ~(np.abs(parts) > largest).any(axis=0))
+
+    def values(self) -> dict[str, Array]:
+        """Unknowns, (3, n) or (n,), and parameters, by name."""
+        q = self.points.q
+        found = {label: q[rows] if rows.stop - rows.start == 3 else q[rows.start] for label, rows in self.labels}
+        return found | dict(self.points.parameters)
+
+    def condition(self, kind: str, block: str, at: int, draws: int = 0) -> float:
+        """Condition number of a block at a state; with ``draws`` a bound from below, which is cheaper for a Hessian."""
+        if kind == "H" and self._jumps()[at]:
+            return float("inf")
+        names = [name for name, _ in blocks_of(kind, self.energy.unknowns)]
+        if kind == "H" and block not in names:
+            block = ",".join(reversed(block.split(",")))
+        if kind == "H":
+            key: Any = (kind, at, draws)
+            if key not in self._known:
+                self._known[key] = hessian_condition(self.energy, self.points, self.truth, at, draws)
+            column = self._known[key]
+        else:
+            if kind not in self._known:
+                self._known[kind] = condition(kind, self.energy, self.points, self.truth)
+            column = self._known[kind][:, at]
+        return float(np.nan_to_num(column[names.index(block)], nan=0.0, posinf=np.inf))
+
+    def _jumps(self) -> Array:
+        """(n,) bool: whether an energy that does not act everywhere begins or ends to act within the rounding of the inputs.
+
+        Its Hessian jumps there, so that its condition number is infinite, and either value is right.
+        """
+        if "jumps" not in self._known:
+            found = np.zeros(len(self), bool)
+            if self.energy.elsewhere == "zero":
+                acts = (self.truth.hessian != 0).any(axis=(0, 1))
+                rows = self.points.rows()
+                for row in range(len(rows)):
+                    for change in (-1, 1):
+                        moved = rows.copy()
+                        moved[row] *= 1 + change * len(rows) * AMPLIFIED * UNIT[self.dtype]
+                        names = list(self.points.parameters)
+                        points = Points(moved[: self.dof], dict(zip(names, moved[self.dof :], strict=True)))
+                        found |= (truth(self.energy, points).hessian != 0).any(axis=(0, 1)) != acts
+            self._known["jumps"] = found
+        return self._known["jumps"]
+
+
+def energy_named(name: str, folder: Path | None) -> Energy:
+    """The declared energy of a name, with scalar parameters.
+
+    Raises
+    ------
+    InputError
+        Where none has that name, or a parameter is a vector.
+    """
+    energy = declared_energy(name, folder or derivations())
+    vectors = [str(parameter.name) for parameter in energy.parameters if parameter.name.bold]
+    if vectors:
+        raise InputError(
+            f"{name}: {', '.join(vectors)} is a vector; only energies with scalar parameters have hard cases"
+        )
+    return energy
+
+
+@cache
+def hard_cases(
+    name: str,
+    folder: Path | None,
+    dtype: str,
+    count: int,
+    wanted: tuple[str, ...] = (),
+    extreme: bool = False,
+    fixed: tuple[tuple[str, float], ...] = (),
+) -> Cases:
+    """The hard cases of an energy.
+
+    Parameters
+    ----------
+    name, folder
+        Of the energy, and where it is declared; those of the package if None.
+    dtype
+        float64 or float32.
+    count
+        States of each regime.
+    wanted
+        Names of regimes; all that the energy has by default.
+    extreme
+        Whether to take those too whose sizes no cloth has.
+    fixed
+        Parameters that have one value throughout.
+
+    Raises
+    ------
+    InputError
+        For names that are not there.
+    """
+    energy = energy_named(name, folder)
+    there = regimes(energy)
+    unknown = [w for w in wanted if w not in [regime.name for regime in there]]
+    if unknown:
+        raise InputError(
+            f"--regime {unknown[0]}: {name} has no such hard cases; there are {', '.join(r.name for r in there)}"
+        )
+    chosen = [r for r in there if (r.name in wanted if wanted else extreme or r.name not in EXTREME)]
+    parts = [points_of(energy, regime, dtype, count, SEED) for regime in chosen]
+    tags = tuple(f"{regime.name} {i}" for regime in chosen for i in range(count))
+    parameters = {key: np.concatenate([part.parameters[key] for part in parts]) for key in parts[0].parameters}
+    points = Points(np.hstack([part.q for part in parts]), parameters)
+    return settled(energy, points, tags, dtype, dict(fixed))
+
+
+def settled(energy: Energy, points: Points, tags: tuple[str, ...], dtype: str, fixed: Mapping[str, float]) -> Cases:
+    """Cases from states."""
+    names = list(points.parameters)
+    for key, value in fixed.items():
+        if key not in names:
+            raise InputError(f"--fix {key}: {energy.name} has the parameters {', '.join(names)}")
+        if not np.isfinite(value):
+            raise InputError(f"--fix {key}={value}: give a finite number")
+    values = {key: np.full(len(points), float(np.dtype(dtype).type(value))) for key, value in fixed.items()}
+    parameters = {key: values.get(key, value) for key, value in points.parameters.items()}
+    points = replace(points, parameters=parameters)
+    return Cases(energy, points, truth(energy, points), tags, dtype)
+
+
+def angles(cases: Cases) -> Array:
+    """(n,) the angle between the first two edges, to some 1e-16, in plain arithmetic; NaN for an energy without angle."""
+    shape = shape_of(cases.energy)
+    if not shape.angle:
+        return np.full(len(cases), np.nan)
+    rows = dict(cases.labels)
+    with np.errstate(all="ignore"):
+        first, second = (
+            cases.points.q[rows[e.head.label]] - cases.points.q[rows[e.tail.label]] for e in shape.edges[:2]
+        )
+        first, second = first / np.abs(first).max(axis=0), second / np.abs(second).max(axis=0)
+        sine = np.sqrt((np.cross(first, second, axis=0) ** 2).sum(axis=0))
+        return np.asarray(np.arctan2(sine, (first * second).sum(axis=0)))

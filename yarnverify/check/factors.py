@@ -1,0 +1,127 @@
+"""A factor between what came back and what is true: a sign, a number, or a product of lengths, parameters and angles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from yarnverify.accuracy.shape import shape_of
+from yarnverify.check.cases import Cases, angles
+from yarnverify.symbolic.tree import Name
+
+Array = NDArray[Any]
+_POWERS = (1, -1, 2, -2)
+
+
+@dataclass(frozen=True)
+class Factor:
+    """``number`` times a product of powers; ``powers`` holds names as a person writes them."""
+
+    number: float
+    powers: tuple[tuple[str, int], ...] = ()
+
+    @property
+    def is_sign(self) -> bool:
+        return not self.powers and abs(self.number + 1) < 1e-3
+
+    def __str__(self) -> str:
+        parts = [f"{name}^{power}" if power > 1 else name for name, power in self.powers if power > 0]
+        below = [f"{name}^{-power}" if power < -1 else name for name, power in self.powers if power < 0]
+        number = number_text(self.number)
+        if number in ("1", "-1") and parts:
+            above = ("-" if number == "-1" else "") + " ".join(parts)
+        else:
+            above = " ".join([number, *parts])
+        bottom = below[0] if len(below) == 1 else f"({' '.join(below)})"
+        return f"{above}/{bottom}" if below else above
+
+    @property
+    def inverse(self) -> Factor:
+        return Factor(1 / self.number, tuple((name, -power) for name, power in self.powers))
+
+
+def number_text(value: float) -> str:
+    """A number as a small fraction, perhaps of pi, where it is one."""
+    for unit, name in ((1.0, ""), (np.pi, "pi"), (1 / np.pi, "1/pi"), (2**0.5, "sqrt(2)")):
+        nearest = Fraction(value / unit).limit_denominator(24)
+        if (
+            nearest
+            and abs(float(nearest) * unit / value - 1) < 1e-5
+            and max(abs(nearest.numerator), nearest.denominator) <= 96
+        ):
+            if not name:
+                return str(nearest)
+            return (f"{'-' if nearest < 0 else ''}{name}") if abs(nearest) == 1 else f"{nearest} {name}"
+    return f"{value:.6g}"
+
+
+def quantities(cases: Cases) -> dict[str, Array]:
+    """What a factor may be made of, at every state: parameters, lengths, differences of sliding coordinates, the angle."""
+    shape = shape_of(cases.energy)
+    rows = dict(cases.labels)
+    found: dict[str, Array] = dict(cases.points.parameters)
+    for edge in shape.edges:
+        difference = cases.points.q[rows[edge.head.label]] - cases.points.q[rows[edge.tail.label]]
+        found[f"|{edge.head.label} - {edge.tail.label}|"] = np.sqrt((difference**2).sum(axis=0))
+    for a, b in combinations(shape.sliding, 2):
+        found[_difference(cases, a, b)] = np.abs(
+            cases.points.q[rows[a.label].start] - cases.points.q[rows[b.label].start]
+        )
+    if shape.angle:
+        angle = angles(cases)
+        found["angle"], found["sin(angle)"], found["cos(angle)"] = angle, np.sin(angle), np.abs(np.cos(angle))
+    return found
+
+
+def _difference(cases: Cases, a: Name, b: Name) -> str:
+    values = cases.points.q[dict(cases.labels)[a.label].start] - cases.points.q[dict(cases.labels)[b.label].start]
+    return f"({a.label} - {b.label})" if np.median(values) > 0 else f"({b.label} - {a.label})"
+
+
+def goes_on(cases: Cases) -> bool:
+    """Whether the angle is that by which a yarn turns at a point, rather than that between two edges of the point."""
+    shape = shape_of(cases.energy)
+    if not shape.angle:
+        return False
+    first, second = shape.edges[:2]
+    return first.tail == second.head or second.tail == first.head
+
+
+def ratio(computed: Array, true: Array, tolerance: float) -> Array | None:
+    """(n,) what the truth must be multiplied by, where that is one number a state; None where it is not."""
+    with np.errstate(all="ignore"):
+        square = (true * true).sum(axis=0)
+        found = (computed * true).sum(axis=0) / square
+        left = np.sqrt(((computed - found * true) ** 2).sum(axis=0)) / np.sqrt(square)
+    if not np.isfinite(found).all() or np.any(left > tolerance * np.abs(found)) or np.any(found == 0):
+        return None
+    return np.asarray(found)
+
+
+def factor(values: Array, named: Mapping[str, Array], tolerance: float) -> Factor | None:
+    """The product that a ratio is at all states, of at most two quantities; None where it is none."""
+    with np.errstate(all="ignore"):
+        if _constant(values, tolerance):
+            return Factor(float(np.median(values)))
+        live = {name: value for name, value in named.items() if np.isfinite(value).all() and np.all(value > 0)}
+        single = [(name, power, value.astype(float) ** power) for name, value in live.items() for power in _POWERS]
+        for name, power, value in single:
+            if _constant(values / value, tolerance):
+                return Factor(float(np.median(values / value)), ((name, power),))
+        for (name, power, value), (other, power_, value_) in combinations(single, 2):
+            if name != other and _constant(values / (value * value_), tolerance):
+                return Factor(float(np.median(values / (value * value_))), ((name, power), (other, power_)))
+    return None
+
+
+def _constant(values: Array, tolerance: float) -> bool:
+    middle = np.median(values)
+    return bool(
+        np.isfinite(values).all() and middle != 0 and np.all(np.abs(values - middle) <= tolerance * abs(middle))
+    )

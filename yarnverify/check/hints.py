@@ -1,0 +1,165 @@
+"""Other conventions under which an implementation would be right: the other sign, another order, another stiffness."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from yarnverify.accuracy.shape import shape_of
+from yarnverify.check.cases import Cases
+from yarnverify.check.conventions import Convention, Results, Row, decoded
+from yarnverify.check.judge import Block
+from yarnverify.check.recognise import Diagnosis
+
+Array = NDArray[Any]
+Found = Sequence[tuple[Block, Diagnosis]]
+_TRIED = 6  # states that an order is tried at
+
+
+def sign_hints(found: Found, convention: Convention) -> list[str]:
+    """``--force`` or ``--jacobian``, where every block of gradient or Hessian has nothing but the wrong sign."""
+    flags = []
+    for kind, flag, taken in (("G", "--force", convention.force), ("H", "--jacobian", convention.jacobian)):
+        wrong = [diagnosis.factor for block, diagnosis in found if block.kind == kind and diagnosis.status == "wrong"]
+        mine = [output for output in convention.outputs if output.kind == kind]
+        if wrong and all(f is not None and f.is_sign for f in wrong):
+            others = sum(block.kind == kind and block.passes and _live(block) for block, _ in found)
+            named = [output.name for output in mine if output.whole]
+            if not others:
+                flags.append(_flag(flag, taken, named))
+    return [f"matches with {' '.join(flags)}"] if flags else []
+
+
+def _live(block: Block) -> bool:
+    return bool(np.any(block.true[:, block.judged]))
+
+
+def _flag(flag: str, taken: bool, named: list[str]) -> str:
+    if taken:
+        return f"no {flag}"
+    if any(name in ("force", "jacobian") for name in named):
+        return f"--returns {'gradient' if flag == '--force' else 'hessian'} (it is not {named[0]})"
+    return flag
+
+
+def factor_hints(found: Found, cases: Cases) -> list[str]:
+    """Another meaning of the stiffness, where everything is off by the same factor."""
+    wrong = [(block, diagnosis) for block, diagnosis in found if diagnosis.status == "wrong"]
+    right = [block for block, _ in found if block.passes and _live(block)]
+    if right or not wrong or any(diagnosis.factor is None for _, diagnosis in wrong):
+        return []
+    texts = {str(diagnosis.factor).lstrip("-") for _, diagnosis in wrong}
+    stiffness = shape_of(cases.energy).stiffness
+    first = wrong[0][1].factor
+    if len(texts) != 1 or stiffness is None or first is None or first.is_sign or str(first).lstrip("-") == "1":
+        return []
+    name = stiffness[0]
+    if first.powers == ((name, -1),) and abs(abs(first.number) - 1) < 1e-5:
+        return [f"{name} is not used: matches with --fix {name}=1"]
+    if first.powers:
+        return []
+    size = f"{abs(first.number):.17g}"
+    return [
+        f"everything is {texts.pop()} times this energy; if your stiffness means that: --with {name}={name}/({size})"
+    ]
+
+
+def orders(convention: Convention, cases: Cases) -> list[tuple[str, tuple[Row, ...]]]:
+    """Other orders of the unknowns, and their text for ``--order``."""
+    points = [label for label, rows in cases.labels if rows.stop - rows.start == 3]
+    scalars = [label for label, rows in cases.labels if rows.stop - rows.start == 1]
+    by_name = {row.label: row for row in convention.rows}
+    now = tuple(row.label for row in convention.rows)
+    found: dict[tuple[str, ...], str] = {}
+
+    def add(labels: Sequence[str]) -> None:
+        single = [
+            part for label in labels for part in ([f"{label}.{axis}" for axis in "xyz"] if label in points else [label])
+        ]
+        found.setdefault(tuple(single), ",".join(labels))
+
+    for p in permutations(points):
+        for s in permutations(scalars):
+            add([*p, *s])
+            add([*s, *p])
+            if len(p) == len(s):
+                add([label for pair in zip(p, s, strict=True) for label in pair])
+            add([*(f"{point}.{axis}" for axis in "xyz" for point in p), *s])
+    return [(text, tuple(by_name[label] for label in labels)) for labels, text in found.items() if labels != now]
+
+
+def order_hint(
+    convention: Convention, cases: Cases, run: Callable[[Array, Array], Array | None], by_name: bool
+) -> list[str]:
+    """An order of the unknowns under which the results are right.
+
+    Parameters
+    ----------
+    convention, cases
+        As they were tried.
+    run
+        Calls the implementation: (m, rows) of states, and the number of the case that each is of; gives (m, total) or None.
+    by_name
+        Whether it takes its unknowns by name, so that the hint is about names.
+    """
+    if any(row.index is None for row in convention.rows):
+        return []
+    at = np.flatnonzero(cases.of_regime("moderate"))[:_TRIED]
+    candidates = orders(convention, cases)
+    if not at.size or not candidates:
+        return []
+    places = [[row.index for row in rows if row.index is not None] for _, rows in candidates]
+    states = np.vstack([cases.points.q[place][:, at].T for place in places])
+    flat = run(states, np.tile(at, len(candidates)))
+    if flat is None:
+        return []
+    for number, (text, rows) in enumerate(candidates):
+        part = flat[number * at.size : (number + 1) * at.size]
+        results = decoded(part, _reordered(convention, rows), cases.dof)
+        if _matches(results, cases, at):
+            if by_name:
+                pairs = [
+                    (old.label, new.label)
+                    for old, new in zip(convention.rows, rows, strict=True)
+                    if old.label != new.label
+                ]
+                named = dict.fromkeys((old.split(".")[0], new.split(".")[0]) for old, new in pairs)
+                renamed = " ".join(f"--with {old}={new}" for old, new in named)
+                return [f"matches with other names: --order {text} {renamed}"]
+            return [f"matches with --order {text}"]
+    return []
+
+
+def _reordered(convention: Convention, rows: tuple[Row, ...]) -> Convention:
+    return Convention(
+        rows,
+        convention.outputs,
+        convention.force,
+        convention.jacobian,
+        convention.layout,
+        convention.column_major,
+        convention.dtype,
+    )
+
+
+def _matches(results: Results, cases: Cases, at: Array) -> bool:
+    """Whether results are right to six digits, up to a common sign of the gradient and of the Hessian."""
+    seen = False
+    for kind, true in (("E", cases.truth.energy), ("G", cases.truth.gradient), ("H", cases.truth.hessian)):
+        given = results.given[kind]
+        if not given.any():
+            continue
+        computed, exact = results.part(kind)[given], true[..., at][given]
+        scale = np.sqrt((exact**2).sum(axis=0)) if exact.ndim > 1 else np.abs(exact)
+        gaps = []
+        for sign in (1, -1):
+            gap = sign * computed - exact
+            gaps.append(np.sqrt((gap**2).sum(axis=0)) if gap.ndim > 1 else np.abs(gap))
+        if not any(np.all(gap <= 1e-6 * scale) for gap in gaps):
+            return False
+        seen = True
+    return seen

@@ -1,0 +1,134 @@
+"""The report as one HTML file that needs nothing else: no network, no script, no installed font."""
+
+from __future__ import annotations
+
+import re
+from base64 import b64encode
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup, escape
+
+from yarnverify.report.accuracy import error_table, kinds, worst_state
+from yarnverify.report.benchmark import tables, where
+from yarnverify.report.mathml import compared, formula
+from yarnverify.report.pages import mistakes
+from yarnverify.report.svg import inline
+
+_FOLDER = Path(__file__).parent
+_ORDER = ("refuted", "inconsistent", "undecided", "proved")
+_SIGN = {"proved": "✓", "refuted": "✗", "undecided": "?", "inconsistent": "!"}
+_PARTS = (  # anchor and heading, in reading order
+    ("verdicts", "Verdicts"),
+    ("corrections", "What is wrong in the document"),
+    ("equations", "Every equation"),
+    ("accuracy", "Accuracy"),
+    ("speed", "Speed"),
+    ("commands", "How to get these numbers again"),
+)
+
+
+def page(records: dict[str, Any], pictures: Mapping[str, str], name: str = "") -> str:
+    """The whole report.
+
+    Parameters
+    ----------
+    records
+        As for :func:`yarnverify.report.pages.pages`.
+    pictures
+        Name without suffix to SVG text, of those that were drawn.
+    name
+        What the command line calls the folder that it is about; empty for the one that comes with the package.
+    """
+    found, derived = records["verdicts"], records["derivations"]
+    templates = Environment(
+        loader=FileSystemLoader(_FOLDER / "templates" / "page"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        autoescape=True,
+    )
+    templates.filters["math"] = lambda latex: Markup(formula(latex))
+    templates.filters["powers"] = _powers
+    templates.globals.update(sign=_SIGN, worst_verdict=_worst, where=where)
+    templates.globals.update(argument=f" {name}" if name else "", prefix=f"{name}/" if name else "")
+    return templates.get_template("report.html.jinja").render(
+        parts=_PARTS,
+        style=Markup((_FOLDER / "templates" / "page" / "report.css").read_text(encoding="utf-8")),
+        font=b64encode((_FOLDER / "fonts" / "stix-two-math.woff2").read_bytes()).decode(),
+        found=found,
+        derived=derived,
+        sections=_sections(found),
+        mistakes=[{**claim, "marked": _marked(claim)} for claim in mistakes(found, None)],
+        accuracy=records.get("accuracy"),
+        benchmark=records.get("benchmark"),
+        errors={name: _errors(records.get("accuracy"), name) for name in derived},
+        hardest={name: _hardest(records.get("accuracy"), name) for name in derived},
+        speeds={name: _speeds(records.get("benchmark"), name) for name in derived},
+        pictures={name: _drawn(text, name) for name, text in sorted(pictures.items())},
+    )
+
+
+def _powers(text: str) -> Markup:
+    """Powers such as 2^-53 in raised figures."""
+    return Markup(re.sub(r"(?<=\d)\^(-?\d+)", lambda m: f"<sup>{m[1].replace('-', '−')}</sup>", str(escape(text))))
+
+
+def _worst(verdicts: list[str]) -> str:
+    return next(verdict for verdict in _ORDER if verdict in verdicts)
+
+
+def _sections(found: dict[str, Any]) -> list[dict[str, Any]]:
+    """The equations of each section in printed order: what is printed, and what was claimed and found."""
+    sections: dict[str, dict[str, Any]] = {}
+    for claim in found["claims"]:
+        equations = sections.setdefault(claim["section"], {})
+        equation = equations.setdefault(claim["equation"], {"line": claim["line"], "printed": {}, "claims": {}})
+        equation["printed"].setdefault(claim["printed"], claim)
+        blocks = equation["claims"].setdefault(claim["verdict"], [])
+        if claim["block"] not in blocks:
+            blocks.append(claim["block"])
+    return [
+        {
+            "name": name,
+            "anchor": "section-" + (name.lower().replace(" ", "-") or "definitions"),
+            "equations": [
+                {"number": number, "formulas": [_marked(claim) for claim in own.pop("printed").values()], **own}
+                for number, own in equations.items()
+            ],
+        }
+        for name, equations in sections.items()
+    ]
+
+
+def _marked(claim: dict[str, Any]) -> dict[str, Any]:
+    """A printed formula and, where it has one, its correction, with marks where they differ."""
+    if claim["correction"] and claim["edit"]:
+        before, after = compared(claim["printed"], claim["correction"])
+    else:
+        before = formula(claim["printed"])
+        after = formula(claim["correction"]) if claim["correction"] else ""
+    return {"printed": Markup(before), "corrected": Markup(after), "edit": claim["edit"]}
+
+
+def _errors(record: dict[str, Any] | None, energy: str) -> list[Any]:
+    return [] if record is None else [error_table(record, energy, kind) for kind in kinds(record, energy)]
+
+
+def _hardest(record: dict[str, Any] | None, energy: str) -> str | None:
+    return None if record is None else worst_state(record, energy, "accurate")
+
+
+def _speeds(record: dict[str, Any] | None, energy: str) -> list[Any]:
+    return tables(record, energy) if record is not None and energy in record["energies"] else []
+
+
+def _drawn(text: str, name: str) -> Markup:
+    energy, _, what = name.rpartition("-")
+    alt = {
+        "error": f"Error of every variant of {energy} as its hard states are approached; the table below has the worst.",
+        "speed": f"Nanoseconds per element against worst error, for every way to compute {energy}; the tables below have both.",
+    }.get(what, name.replace("-", " "))
+    return Markup(inline(text, name, alt))
