@@ -1,4 +1,4 @@
-"""The command line: ``yarnverify prove | derive | generate | check | accuracy | benchmark | fuzz | simulate |
+"""The command line: ``yarnverify prove | derive | generate | check | export | accuracy | benchmark | fuzz | simulate |
 report``.
 
 Exit status: 0 all as expected; 1 a check failed, or an erratum is new or stale; 2 bad usage or input; 3 asked for but
@@ -469,6 +469,32 @@ def simulate(
         print("\n".join([*study_lines(found.result, found.timings), *lines]))
     if found.missed:
         sys.exit(1)
+
+
+@app.command
+def export(
+    energy: str,
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="Folder for the files.")],
+    count: Annotated[int, Parameter(help="States of each hard case.")] = 8,
+    extreme: Annotated[
+        bool, Parameter(negative="", help="Sizes from 1e-200 to 1e200 too, which no cloth has.")
+    ] = False,
+    derivations: Annotated[Path | None, Parameter(help="Folder of declared energies.")] = None,
+) -> None:
+    """Golden vectors, corrected formulas and C source, for those who do not use Python.
+
+    Parameters
+    ----------
+    energy
+        Name of a declared energy, such as bending.
+    """
+    from yarnverify.export.command import export as run
+
+    with progress("exporting") as advance:
+        lines = run(energy, out, derivations, count, extreme, advance)
+    print("\n".join(lines))
 
 
 @app.command
