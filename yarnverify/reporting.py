@@ -77,8 +77,14 @@ def build_report(
         texts["report.html"] = _page(records | measured, out / "pictures", of.name)
     outcome = settle_files(out, texts, check, sorted(there - set(texts)), of.command("yarnverify report"))
     outcome.lines = [*lines, *outcome.lines]
+    outcome.record = {
+        "tally": records["verdicts"]["tally"],
+        "as_expected": expected,
+        "as_generated": not outcome.differs,
+        "files": sorted(texts),
+    }
     outcome.differs |= not expected
-    outcome.record = {"tally": records["verdicts"]["tally"], "as_expected": expected, "files": sorted(texts)}
+    outcome.verdicts = records["verdicts"]
     return outcome
 
 
