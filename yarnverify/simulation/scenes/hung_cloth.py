@@ -16,7 +16,7 @@ from yarnverify.simulation.setting import Moving
 @scene(
     title="a cloth hung by two corners",
     size="yarns of each family",
-    sizes=(40,),
+    sizes=(56,),
     wall="at the crossings of two corners, nearer to each other than the edge between them is long",
     least=3,
     solvers=("direct",),
@@ -28,7 +28,7 @@ def hung_cloth(
     h: float = positive(5e-3, "s", "implicit Euler damps what is faster, as air and friction of fibres do"),
     k_s: float = positive(50.0, "N", "cotton yarn of 20 tex, 2.5 N/tex"),
     k_b: float = positive(6e-10, "N m^2", "100 fibres of cotton that slide freely, 6e-12 N m^2 each"),
-    k_x: float = positive(1e-3, "N", "open gauze: 4 k_x/L = 3.3 N/m, a tenth of shirting"),
+    k_x: float = positive(3e-4, "N", "open gauze: 4 k_x/L = 1 N/m, a fifth of a light shirting"),
     rho: float = positive(2e-5, "kg/m", "20 tex"),
     L: float = positive(1.2e-3, "m", "gauze of 8 yarns a centimetre"),
     R: float = positive(0.15e-3, "m", "20 tex, loosely twisted"),

@@ -15,15 +15,15 @@ from yarnverify.simulation.setting import Array, Known, Moving
 @scene(
     title="a yarn pulled out of a cloth",
     size="yarns of each family",
-    sizes=(14,),
+    sizes=(20,),
     wall="at both ends of every weft, and at the upper end of one warp, which is pulled; crossings have no friction",
     least=3,
     solvers=("direct",),
 )
 def pulled_yarn(
     size: int,
-    pull: float = positive(10e-3, "m", "how far"),
-    tail: float = positive(12e-3, "m", "how far every yarn goes on beyond the cloth"),
+    pull: float = positive(8e-3, "m", "how far"),
+    tail: float = positive(9e-3, "m", "how far every yarn goes on beyond the cloth"),
     until: float = positive(0.1, "s"),
     h: float = positive(1e-3, "s"),
     k_s: float = positive(50.0, "N", "cotton yarn of 20 tex, 2.5 N/tex"),
