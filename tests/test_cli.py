@@ -198,7 +198,7 @@ def test_bad_declarations_and_errata_are_status_2_and_one_line(
     "args",
     [
         ("prove", "none.md"),
-        ("prove", "."),
+        ("prove", "empty"),
         ("prove", "d.md", "more"),
         ("prove", "d.md", "--nonsense"),
         ("prove", "d.md", "--json"),

@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 
 from tests.variants import kernel
-from yarnverify.errors import NotRunError
+from yarnverify.errors import InputError, NotRunError
 from yarnverify.kernels import gravity, kinetic, plane, sphere
 from yarnverify.library import MAIN_DOCUMENT
 from yarnverify.symbolic.court import Verdict
@@ -105,8 +105,10 @@ def test_generate_refuses_an_energy_with_wrong_units(tmp_path: Path, folder: Pat
     (tmp_path / MAIN_DOCUMENT).write_bytes((folder / MAIN_DOCUMENT).read_bytes())
     text = (folder / "gravity.py").read_text(encoding="utf-8")
     (tmp_path / "gravity.py").write_text(text.replace('"m s^-2"', '"m s^-1"'), encoding="utf-8")
-    with pytest.raises(NotRunError, match="gravity: the energy comes out in kg m\\^2 s\\^-1, and J is kg m\\^2 s\\^-2"):
-        kernel_modules(tmp_path, MAIN_DOCUMENT, "accurate", lambda label, total: None)
+    with pytest.raises(
+        InputError, match=r"gravity.py:10:1: gravity: the energy comes out in kg m\^2 s\^-1, and J is kg m\^2 s\^-2"
+    ):
+        kernel_modules(tmp_path, MAIN_DOCUMENT, "accurate")
 
 
 # -- what is proved ---------------------------------------------------------------------------------------------------

@@ -19,24 +19,23 @@ from yarnverify.symbolic.declare import Declarations, Point, Positive, Sliding, 
 from yarnverify.symbolic.derive import declared_section
 from yarnverify.symbolic.emit import plain_program, statements
 from yarnverify.symbolic.explain import explain, explain_energy, explanation
-from yarnverify.symbolic.modules import VARIANTS, derived_programs, kernel_modules, printed_program, proved
+from yarnverify.symbolic.modules import VARIANTS, Modules, derived_programs, kernel_modules, printed_program, proved
 from yarnverify.symbolic.plain import plain
 from yarnverify.symbolic.prove import read_with
 from yarnverify.symbolic.reader import read_formula
 from yarnverify.symbolic.tree import Expr
 
 ENERGIES = ("stretch", "bending", "shear", "parallel_contact")
-
-
-Modules = tuple[dict[str, str], dict[str, Any], list[str]]
+PHYSICS = ("gravity", "kinetic", "plane", "sphere")  # what no document prints
 
 
 @pytest.fixture(scope="module")
 def modules(folder: Path) -> Modules:
-    """Text of each file, operation counts, and the steps that were told, worked out afresh."""
+    """The generated files, worked out afresh."""
     steps: list[str] = []
     made = kernel_modules(folder, MAIN_DOCUMENT, generation.DEFAULT_VARIANT, lambda label, total: steps.append(label))
-    return *made, steps
+    assert len(steps) == len(VARIANTS) * len(ENERGIES) + 3 * len(PHYSICS)
+    return made
 
 
 # -- kernels ----------------------------------------------------------------------------------------------------------
@@ -45,20 +44,20 @@ def modules(folder: Path) -> Modules:
 def test_committed_kernels_are_what_the_derivations_give(modules: Modules) -> None:
     folder = Path(generation.__file__).parent / "kernels"
     there = {path.relative_to(folder).as_posix() for path in folder.rglob("*.py")} - generation.WRITTEN_BY_HAND
-    assert there == set(modules[0])
-    for name, text in modules[0].items():
+    assert there == set(modules.texts)
+    for name, text in modules.texts.items():
         assert (folder / name).read_bytes() == text.encode(), f"{name} differs: run yarnverify generate"
 
 
 def test_kernels_hold_no_dates_and_name_their_source(modules: Modules) -> None:
-    for name, text in modules[0].items():
+    for name, text in modules.texts.items():
         assert "yarnverify generate" in text or name.endswith("__init__.py")
         assert "202" not in text
-    assert "equation (8) cannot be evaluated as printed: k should be k_s" in modules[0]["printed/stretch.py"]
+    assert "equation (8) cannot be evaluated as printed: k should be k_s" in modules.texts["printed/stretch.py"]
 
 
 def test_the_fused_form_costs_less_than_its_parts(modules: Modules) -> None:
-    for counts in modules[1].values():
+    for counts in modules.operations.values():
         for variant in counts.values():
             assert (
                 variant["hessian"] <= variant["evaluate"] <= sum(variant[k] for k in ("energy", "gradient", "hessian"))
@@ -76,15 +75,15 @@ DAMAGE = {
 def test_a_damaged_kernel_is_shown_and_not_touched(
     damage: str, modules: Modules, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    settle_files(tmp_path, modules[0], False, [], "")
+    settle_files(tmp_path, modules.texts, False, [], "")
     victim = tmp_path / "differentiated" / "stretch.py"
     victim.write_bytes(DAMAGE[damage](victim.read_text(encoding="utf-8")).encode())
     before = victim.read_bytes()
-    outcome = settle_files(tmp_path, modules[0], True, [], "yarnverify generate")
+    outcome = settle_files(tmp_path, modules.texts, True, [], "yarnverify generate")
     assert outcome.differs and any("differentiated/stretch.py" in line for line in outcome.lines)
     assert "yarnverify generate" in outcome.lines[-1] and victim.read_bytes() == before
-    settle_files(tmp_path, modules[0], False, [], "")
-    assert not settle_files(tmp_path, modules[0], True, [], "").differs
+    settle_files(tmp_path, modules.texts, False, [], "")
+    assert not settle_files(tmp_path, modules.texts, True, [], "").differs
 
 
 def test_missing_and_stale_files(tmp_path: Path) -> None:
@@ -102,10 +101,9 @@ def test_a_folder_that_cannot_be_written_is_told_in_one_line(tmp_path: Path) -> 
 
 
 def test_generate_agrees_with_the_package(modules: Modules) -> None:
-    assert len(modules[2]) == len(VARIANTS) * len(ENERGIES) + 3 * 4  # those that no document prints
     outcome = generate_kernels(True)
-    assert not outcome.differs and outcome.record == modules[1]
-    assert set(outcome.record) == set(ENERGIES)
+    assert not outcome.differs and outcome.record == modules.operations
+    assert set(outcome.record) == {*ENERGIES, *PHYSICS}
     assert outcome.record["bending"]["differentiated"]["evaluate"] > 0
 
 
@@ -278,7 +276,7 @@ def test_a_report_with_a_new_mistake_is_not_as_expected(
     shelf = Shelf(derivations(), MAIN_DOCUMENT, "")
     found = prove_source(Source(MAIN_DOCUMENT, text), shelf)
     settle(found, shelf, ())
-    monkeypatch.setattr(reporting, "verdicts", lambda advance: (found, "made"))
+    monkeypatch.setattr(reporting, "verdicts", lambda document, advance: (found, "made"))
     outcome = build_report(tmp_path, False)
     assert outcome.differs and not outcome.record["as_expected"]
     index, stretch, bending = (

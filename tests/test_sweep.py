@@ -52,7 +52,7 @@ def test_the_plan_holds_every_energy_variant_type_and_regime() -> None:
 
 
 def test_what_has_no_kernel_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweep, "has_kernel", lambda variant, energy: variant == "printed")
+    monkeypatch.setattr(sweep, "has_kernel", lambda variant, energy, folder: variant == "printed")
     units, missing = plan(TINY, ["shear"], ["fast", "printed"])
     assert all(unit.variants == ("printed",) for unit in units)
     assert missing == ["fast shear: there is no such kernel"]
@@ -201,7 +201,9 @@ def small(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     monkeypatch.setattr(
         command,
         "plan",
-        lambda profile, energies, variants: plan(profile, energies or ["stretch", "parallel_contact"], variants),
+        lambda profile, energies, variants, folder: plan(
+            profile, energies or ["stretch", "parallel_contact"], variants
+        ),
     )
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     # targets are judged on the real profile, by `yarnverify accuracy --check`; here the commands are

@@ -1,4 +1,4 @@
-"""The command line: ``yarnverify prove | derive | generate | check | accuracy | benchmark | fuzz | simulate |
+"""The command line: ``yarnverify prove | derive | generate | check | export | accuracy | benchmark | fuzz | simulate |
 report``.
 
 Exit status: 0 all as expected; 1 a check failed, or an erratum is new or stale; 2 bad usage or input; 3 asked for but
@@ -146,13 +146,15 @@ def prove(
     Parameters
     ----------
     document
-        Markdown or text with numbered formulas; the paper's document by default.
+        Markdown or text with numbered formulas, or a folder that holds it; the paper's document by default.
     """
     from yarnverify import ci
     from yarnverify.errors import InputError
+    from yarnverify.project import document_of
     from yarnverify.show import show_verdicts
     from yarnverify.verdicts import path_of, verdicts
 
+    document = document_of(document)
     try:
         with progress("proving") as advance:
             record, took = verdicts(document, derivations, cache, advance)
@@ -185,10 +187,14 @@ def derive(
     Parameters
     ----------
     energy
-        Name of a declared energy, such as bending.
+        Name of a declared energy, such as bending; one of your own as FOLDER/NAME.
     """
+    from yarnverify.project import find
     from yarnverify.symbolic.explain import explain, explanation
 
+    if derivations is None:
+        place, name = find(energy)
+        derivations, energy = place.folder, name or ""
     record = explanation(energy, derivations)
     if not _json(record, json_file):
         print(explain(record, format))
@@ -196,16 +202,25 @@ def derive(
 
 @app.command
 def generate(
+    folder: Path | None = None,
+    /,
     *,
     check: Annotated[bool, Parameter(negative="", help="Compare with the files instead of writing them.")] = False,
     json_file: Json = None,
     cache: Annotated[bool, Parameter(help="Use and keep results that are already known.")] = True,
 ) -> None:
-    """The kernels, from the derivations."""
+    """The kernels, from the derivations.
+
+    Parameters
+    ----------
+    folder
+        Folder with energies of your own; its kernels are written to FOLDER/kernels. The package's own by default.
+    """
     from yarnverify.generation import generate_kernels
+    from yarnverify.project import project
 
     with progress("generating") as advance:
-        outcome = generate_kernels(check, advance, cache)
+        outcome = generate_kernels(check, advance, cache, project(folder))
     _finish(outcome, json_file)
 
 
@@ -221,7 +236,9 @@ def accuracy(
     state: Annotated[
         Path | None, Parameter(help="Folder for what is done, until all is; in the cache by default.")
     ] = None,
-    out: Annotated[Path, Parameter(help="Folder of reports that holds the record.")] = Path("reports"),
+    out: Annotated[
+        Path | None, Parameter(help="Folder of reports that holds the record; reports, or FOLDER/reports, by default.")
+    ] = None,
     write: Annotated[bool, Parameter(negative="", help="Write the record.")] = False,
     check: Annotated[bool, Parameter(negative="", help="Compare with the record instead of showing tables.")] = False,
     replay: Annotated[
@@ -234,22 +251,25 @@ def accuracy(
     Parameters
     ----------
     energy
-        Name of a declared energy, such as bending; all by default.
+        Name of a declared energy, such as bending; a folder with energies of your own, or one of them as FOLDER/NAME.
+        All of the package by default.
     """
+    from yarnverify.project import find
+
+    of, name = find(energy)
     if replay is not None:
         from yarnverify.accuracy.replay import replay as replay_state
         from yarnverify.accuracy.replay import replay_lines
-        from yarnverify.library import derivations
 
-        found = replay_state(replay, derivations())
+        found = replay_state(replay, of.folder, str(of.folder) if of.own else "")
         if not _json(found, json_file):
             print("\n".join(replay_lines(found)))
         return
     from yarnverify.accuracy.command import accuracy as measured
 
     with progress("measuring") as advance:
-        names = () if energy is None else (energy,)
-        outcome = measured(names, variant, profile, executor, jobs, state, out, write, check, advance)
+        names = () if name is None else (name,)
+        outcome = measured(names, variant, profile, executor, jobs, state, out, write, check, advance, of)
     _finish(outcome, json_file)
 
 
@@ -296,19 +316,32 @@ def benchmark(
 
 @app.command
 def report(
+    folder: Path | None = None,
+    /,
     *,
-    out: Annotated[Path, Parameter(help="Folder for the pages and the records behind them.")] = Path("reports"),
+    out: Annotated[
+        Path | None,
+        Parameter(help="Folder for the pages and the records behind them; reports, or FOLDER/reports, by default."),
+    ] = None,
     check: Annotated[bool, Parameter(negative="", help="Compare with the files instead of writing them.")] = False,
     pictures: Annotated[
         bool, Parameter(negative="", help="Draw the pictures of measured records (needs matplotlib).")
     ] = False,
     json_file: Json = None,
 ) -> None:
-    """All of it, to reports/: verdicts, corrections, derivations, kernels, and what was measured; a page an energy."""
+    """All of it, to reports/: verdicts, corrections, derivations, kernels, and what was measured; a page an energy.
+
+    Parameters
+    ----------
+    folder
+        Folder with energies, and perhaps a document, of your own: its kernels are written to FOLDER/kernels and measured.
+        The paper's by default.
+    """
+    from yarnverify.project import project
     from yarnverify.reporting import build_report
 
     with progress("reporting") as advance:
-        outcome = build_report(out, check, advance, pictures)
+        outcome = build_report(out, check, advance, pictures, project(folder))
     _finish(outcome, json_file)
 
 
@@ -434,8 +467,34 @@ def simulate(
         found, lines = run(scene, size or (), settings or (), solver, out, resume, every, pictures, tell)
     if not _json({"result": found.result, "timings": found.timings}, json_file):
         print("\n".join([*study_lines(found.result, found.timings), *lines]))
-    if found.failures:
+    if found.missed:
         sys.exit(1)
+
+
+@app.command
+def export(
+    energy: str,
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="Folder for the files.")],
+    count: Annotated[int, Parameter(help="States of each hard case.")] = 8,
+    extreme: Annotated[
+        bool, Parameter(negative="", help="Sizes from 1e-200 to 1e200 too, which no cloth has.")
+    ] = False,
+    derivations: Annotated[Path | None, Parameter(help="Folder of declared energies.")] = None,
+) -> None:
+    """Golden vectors, corrected formulas and C source, for those who do not use Python.
+
+    Parameters
+    ----------
+    energy
+        Name of a declared energy, such as bending.
+    """
+    from yarnverify.export.command import export as run
+
+    with progress("exporting") as advance:
+        lines = run(energy, out, derivations, count, extreme, advance)
+    print("\n".join(lines))
 
 
 @app.command

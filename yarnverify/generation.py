@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from yarnverify.library import MAIN_DOCUMENT, declared_files, derivations, known
+from yarnverify.library import declared_files, known
+from yarnverify.project import Project, project
 
 DEFAULT_VARIANT = "accurate"
 WRITTEN_BY_HAND = {
@@ -77,9 +78,12 @@ def settle_files(folder: Path, texts: dict[str, str], check: bool, stale: list[s
 
 
 def generate_kernels(
-    check: bool, advance: Callable[[str, int], None] = lambda label, total: None, cache: bool = True
+    check: bool,
+    advance: Callable[[str, int], None] = lambda label, total: None,
+    cache: bool = True,
+    of: Project | None = None,
 ) -> Outcome:
-    """Generate every variant of every declared energy of the main document.
+    """Generate every variant of every energy of a project.
 
     Parameters
     ----------
@@ -89,6 +93,8 @@ def generate_kernels(
         Called as each module is made.
     cache
         Whether what the same derivations gave in an earlier run is used and kept.
+    of
+        The project; that of the package by default.
 
     Raises
     ------
@@ -96,16 +102,27 @@ def generate_kernels(
         For derivations that cannot be read or proved, and files that cannot be written.
     """
 
+    place = of or project()
+
     def make() -> dict[str, Any]:
         from yarnverify.symbolic.modules import kernel_modules
 
-        texts, counts = kernel_modules(derivations(), MAIN_DOCUMENT, DEFAULT_VARIANT, advance)
-        return {"texts": texts, "counts": counts}
+        return asdict(kernel_modules(place.folder, place.document, DEFAULT_VARIANT, advance, place.package))
 
-    folder = Path(__file__).parent / "kernels"
-    made, _ = known([b"kernels", DEFAULT_VARIANT.encode(), *declared_files(derivations())], make, cache)
+    what = [b"kernels", DEFAULT_VARIANT.encode(), place.package.encode(), place.document.encode()]
+    made, _ = known([*what, *declared_files(place.folder)], make, cache)
     texts = made["texts"]
-    there = {path.relative_to(folder).as_posix() for path in folder.rglob("*.py")}
-    outcome = settle_files(folder, texts, check, sorted(there - set(texts) - WRITTEN_BY_HAND), "yarnverify generate")
-    outcome.record = made["counts"]
+    there = {path.relative_to(place.kernels).as_posix() for path in place.kernels.rglob("*.py")}
+    by_hand = set() if place.own else WRITTEN_BY_HAND
+    stale = sorted(
+        name for name in there - set(texts) - by_hand if not place.own or _is_generated(place.kernels / name)
+    )
+    outcome = settle_files(place.kernels, texts, check, stale, place.command("yarnverify generate"))
+    outcome.record = made["operations"]
+    outcome.lines += made["notes"]
     return outcome
+
+
+def _is_generated(path: Path) -> bool:
+    """Whether a file says that it may be removed when nothing belongs to it any more."""
+    return "Generated" in path.read_text(encoding="utf-8", errors="replace")[:2000]

@@ -85,15 +85,15 @@ def shelf_for(document: Path, text: str, choice: str | None = None) -> Shelf:
         return Shelf(None, document.name, "by itself alone", document.parent)
     if choice is not None:
         folder = Path(choice)
-        names = _declared_documents(folder)
+        names = declared_documents(folder)
         if not names:
             what = "declares no energies of a document" if folder.is_dir() else "is no folder"
             raise InputError(f"{folder}: {what}; give a folder of derivations, or none")
         name = document.name if document.name in names else _nearest(folder, names, text)[1]
         return Shelf(folder, name, f"by the energies declared for {name} in {folder}")
-    if document.name in _declared_documents(document.parent):
+    if document.name in declared_documents(document.parent):
         return Shelf(document.parent, document.name, f"by the energies declared in {document.parent}")
-    common, name = _nearest(derivations(), _declared_documents(derivations()), text)
+    common, name = _nearest(derivations(), declared_documents(derivations()), text)
     if 2 * common >= len(_displays(text)) > 0:
         return Shelf(
             derivations(), name, f"by the energies declared for {name}, with which it shares {common} displays"
@@ -112,7 +112,8 @@ def _text(path: Path) -> str:
     return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
 
 
-def _declared_documents(folder: Path) -> set[str]:
+def declared_documents(folder: Path) -> set[str]:
+    """The documents that the energies of a folder name."""
     return {name for path in folder.glob("*.py") for name in _DECLARES.findall(_text(path))}
 
 
@@ -141,6 +142,12 @@ def errata(shelf: Shelf) -> tuple[Erratum, ...]:
         if entry["document"] == shelf.document:
             found.append(Erratum(entry["equation"], entry["change"], entry["reason"]))
     return tuple(found)
+
+
+def prints_formulas(path: Path) -> bool:
+    """Whether a file has numbered displays."""
+    found = (_SPACE.sub("", display) for display in _DISPLAY.findall(_text(path)))
+    return any(_NUMBER.search(display) for display in found)
 
 
 # -- results that are already known -----------------------------------------------------------------------------------

@@ -10,9 +10,10 @@ from typing import Any
 
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.generation import Outcome, generate_kernels, settle_files
-from yarnverify.library import MAIN_DOCUMENT, declared_files, derivations, known
+from yarnverify.library import declared_files, known
+from yarnverify.project import Project, project
 from yarnverify.show import mistake_lines, tally_lines
-from yarnverify.verdicts import verdicts
+from yarnverify.verdicts import nothing_printed, verdicts
 
 MEASURED = ("accuracy", "benchmark")  # records that commands of their own write
 
@@ -23,20 +24,26 @@ COMMANDS = {
 
 
 def build_report(
-    out: Path, check: bool, advance: Callable[[str, int], None] = lambda label, total: None, pictures: bool = False
+    out: Path | None,
+    check: bool,
+    advance: Callable[[str, int], None] = lambda label, total: None,
+    pictures: bool = False,
+    of: Project | None = None,
 ) -> Outcome:
     """Write the report into a folder, or compare it with what is there.
 
     Parameters
     ----------
     out
-        The folder; ``records/`` below it holds the JSON that the pages are made from.
+        The folder, that of the project by default; ``records/`` below it holds the JSON that the pages are made from.
     check
         Compare instead of writing.
     advance
         Called as each step is done.
     pictures
         Draw the pictures of measured records anew; the pages show those that are there.
+    of
+        The project; the package's own by default. The kernels of your own are written and measured too, unless ``check``.
 
     Raises
     ------
@@ -45,33 +52,39 @@ def build_report(
     """
     from yarnverify.report.pages import pages
 
+    of = of or project()
+    out = of.reports if out is None else out
     if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: is not a folder")
-    records, lines, expected = _records(advance)
+        raise InputError(f"{out}: is not a folder; give --out another one")
+    records, lines, expected = _records(of, check, advance)
     texts = {
         f"records/{name}.json": json.dumps(record, indent=1, ensure_ascii=False) + "\n"
         for name, record in records.items()
     }
+    if of.own and not check:
+        lines += _sweep(of, out, advance)
     measured = _measured(out)
     if pictures:
         _draw(out / "pictures", measured, list(records["derivations"]), lines)
     drawn = sorted(path.name for path in (out / "pictures").glob("*.png"))
-    texts |= pages({name: json.loads(texts[f"records/{name}.json"]) for name in records} | measured, drawn)
+    texts |= pages(
+        {name: json.loads(texts[f"records/{name}.json"]) for name in records} | measured, drawn, of.source, of.name
+    )
     there = {path.relative_to(out).as_posix() for pattern in ("*.md", "records/*.json") for path in out.glob(pattern)}
     there -= {f"records/{name}.json" for name in MEASURED}
     if not check:  # made from the same records at any time, and so not kept under version control
-        texts["report.html"] = _page(records | measured, out / "pictures")
-    outcome = settle_files(out, texts, check, sorted(there - set(texts)), "yarnverify report")
+        texts["report.html"] = _page(records | measured, out / "pictures", of.name)
+    outcome = settle_files(out, texts, check, sorted(there - set(texts)), of.command("yarnverify report"))
     outcome.lines = [*lines, *outcome.lines]
     outcome.differs |= not expected
     outcome.record = {"tally": records["verdicts"]["tally"], "as_expected": expected, "files": sorted(texts)}
     return outcome
 
 
-def _page(records: dict[str, Any], folder: Path) -> str:
+def _page(records: dict[str, Any], folder: Path, name: str) -> str:
     from yarnverify.report.html import page
 
-    return page(records, {path.stem: path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.svg"))})
+    return page(records, {path.stem: path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.svg"))}, name)
 
 
 def _draw(folder: Path, measured: dict[str, Any], energies: list[str], lines: list[str]) -> None:
@@ -107,27 +120,48 @@ def _measured(out: Path) -> dict[str, Any]:
     return found
 
 
-def _records(advance: Callable[[str, int], None]) -> tuple[dict[str, Any], list[str], bool]:
+def _sweep(of: Project, out: Path, advance: Callable[[str, int], None]) -> list[str]:
+    """Measure the kernels of a project on their hard cases and write the record; what to say of it."""
+    from yarnverify.accuracy.command import accuracy
+
+    try:
+        measured = accuracy((), (), "quick", "processes", None, None, out, True, False, advance, of)
+    except NotRunError as error:
+        return [f"Not measured: {error}"]
+    return measured.lines[-1:]
+
+
+def _records(of: Project, check: bool, advance: Callable[[str, int], None]) -> tuple[dict[str, Any], list[str], bool]:
     """The records behind the pages, what to say of them, and whether all is as expected."""
+    from yarnverify.accuracy.regimes import not_drawn
     from yarnverify.symbolic.declare import load_declarations
     from yarnverify.symbolic.explain import explain_energy
 
-    found, took = verdicts(advance=advance)
-    kernels = generate_kernels(check=True, advance=advance)
-    declarations = load_declarations(derivations())
-    energies = [energy for energy in declarations.energies if energy.document == MAIN_DOCUMENT]
+    declarations = load_declarations(of.folder)
+    energies = [energy for energy in declarations.energies if energy.document in (of.document, "")]
+    found, took = nothing_printed(), "No document"
+    if of.document:
+        found, took = verdicts(of.folder / of.document, advance=advance)
+    kernels = generate_kernels(check or not of.own, advance, of=of)
     order = [part["section"] for part in found["completeness"]]
     energies.sort(key=lambda energy: order.index(energy.section) if energy.section in order else len(order))
     derived = {}
     for energy in energies:
+        title = energy.section or energy.name.replace("_", " ").capitalize()
         explained, _ = known(
-            [b"derivation", energy.name.encode(), *declared_files(derivations())],
+            [b"derivation", energy.name.encode(), *declared_files(of.folder)],
             partial(explain_energy, energy, declarations),
         )
-        derived[energy.name] = {"section": energy.section, **explained}
+        derived[energy.name] = {"section": energy.section, "title": title, "not_swept": not_drawn(energy), **explained}
         advance(f"explaining {energy.name}", len(energies))
-    lines = [*mistake_lines(found), *tally_lines(found), f"{took}."]
-    if kernels.differs:
+    lines = (
+        [*mistake_lines(found), *tally_lines(found), f"{took}."]
+        if of.document
+        else ["No document: nothing printed to judge."]
+    )
+    if of.own:
+        lines += kernels.lines
+    elif kernels.differs:
         lines.append("The kernels differ from what the derivations give; see: yarnverify generate --check")
     proved = all(record["all_proved"] for record in derived.values() if record["measures"])
     return (

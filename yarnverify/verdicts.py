@@ -71,6 +71,22 @@ def verdicts(
     return record, f"{'known from an earlier run' if earlier else 'derived and proved'} in {seconds:.2f} s"
 
 
+def nothing_printed() -> dict[str, Any]:
+    """The record of a folder without a document."""
+    record: dict[str, Any] = {
+        "schema": 1,
+        "document": "",
+        "judged": "by nothing, since there is no document",
+        "equations": [],
+        "tally": dict.fromkeys(("proved", "refuted", "undecided", "inconsistent"), 0),
+        "claims": [],
+        "given": [],
+        "completeness": [],
+    }
+    settle(record, Shelf(None, "", ""), ())
+    return record
+
+
 def settle(record: dict[str, Any], shelf: Shelf, accepted: tuple[Erratum, ...]) -> None:
     """Mark what the errata accept; add what is new, what is stale, and whether all is as expected."""
     used: set[Erratum] = set()

@@ -7,6 +7,7 @@ so that any executor may run it anywhere.
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -79,23 +80,32 @@ def declared_energy(name: str, folder: str | Path) -> Energy:
     return found
 
 
-def kernel(variant: str, energy: str) -> Any:
-    """The generated module of a variant of an energy.
+def kernel(variant: str, energy: str, folder: str | Path = "") -> Any:
+    """The generated module of a variant of an energy: of the package, or of a folder of your own.
 
     Raises
     ------
     InputError
         Where there is none.
     """
-    try:
-        return importlib.import_module(f"yarnverify.kernels.{variant}.{energy}")
-    except ModuleNotFoundError:
-        raise InputError(f"{variant} {energy}: there is no such kernel") from None
+    missing = InputError(f"{variant} {energy}: there is no such kernel")
+    if not folder:
+        try:
+            return importlib.import_module(f"yarnverify.kernels.{variant}.{energy}")
+        except ModuleNotFoundError:
+            raise missing from None
+    path = Path(folder) / "kernels" / variant / f"{energy}.py"
+    spec = importlib.util.spec_from_file_location(f"{variant}_{energy}", path) if path.is_file() else None
+    if spec is None or spec.loader is None:
+        raise missing
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
-def has_kernel(variant: str, energy: str) -> bool:
+def has_kernel(variant: str, energy: str, folder: str | Path = "") -> bool:
     try:
-        kernel(variant, energy)
+        kernel(variant, energy, folder)
     except InputError:
         return False
     return True
@@ -222,7 +232,7 @@ def _curve(energy: Energy, unit: Unit) -> dict[str, Any]:
     amplification["H"] = [significant(float(conditions.at("H", at).max())) for at in range(0, len(points), unit.count)]
     lines = {}
     for variant in unit.variants:
-        computed, _ = compute(kernel(variant, energy.name), points, exact, unit.dtype)
+        computed, _ = compute(kernel(variant, energy.name, unit.derivations), points, exact, unit.dtype)
         lines[variant] = {
             output: worst(measure(output, computed[output], exact, energy.unknowns, unit.dtype).worst_block)
             for output in OUTPUTS
@@ -244,7 +254,7 @@ def cells(energy: Energy, points: Points, unit: Unit) -> list[dict[str, Any]]:
     gone = _zero_length(energy, points)
     found = []
     for variant in unit.variants:
-        computed, invented = compute(kernel(variant, energy.name), points, exact, unit.dtype)
+        computed, invented = compute(kernel(variant, energy.name, unit.derivations), points, exact, unit.dtype)
         target = limits(variant, unit.dtype)
         outputs = {}
         for output in OUTPUTS:

@@ -10,6 +10,7 @@ from yarnverify.accuracy.record import grown, make_record, missed_targets, read_
 from yarnverify.accuracy.sweep import PROFILES, executor_named, finish, plan, run, state_folder
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.generation import Outcome
+from yarnverify.project import Project, project
 
 RECORD = Path("records") / "accuracy.json"
 
@@ -22,11 +23,13 @@ def sweep(
     jobs: int | None,
     state: Path | None,
     advance: Callable[[str, int], None],
+    of: Project,
 ) -> dict[str, Any]:
     """The record of a sweep; what an interrupted run of the same sweep has finished is not worked out again."""
-    units, missing = plan(PROFILES[profile], energies, variants)
+    units, missing = plan(PROFILES[profile], energies, variants, of.folder if of.own else None)
     if not units:
-        raise NotRunError(f"no kernels to measure: {'; '.join(missing)}")
+        made = f"; they are made by: {of.command('yarnverify generate')}" if of.own else ""
+        raise NotRunError(f"no kernels to measure: {'; '.join(missing)}{made}")
     folder = state or state_folder(units)
     try:
         with executor_named(executor, jobs) as pool:
@@ -35,7 +38,8 @@ def sweep(
         kept = len(list(folder.glob("*.json")))
         raise NotRunError(f"interrupted; {kept} of {len(units)} parts are kept, and the same command goes on") from None
     finish(folder)
-    return make_record(PROFILES[profile], units, results, missing)
+    command = f"{of.command('yarnverify accuracy')} --profile {profile} --write"
+    return make_record(PROFILES[profile], units, results, missing, command)
 
 
 def accuracy(
@@ -45,10 +49,11 @@ def accuracy(
     executor: str,
     jobs: int | None,
     state: Path | None,
-    out: Path,
+    out: Path | None,
     write: bool,
     check: bool,
     advance: Callable[[str, int], None],
+    of: Project | None = None,
 ) -> Outcome:
     """Sweep, and show, write or compare what was found.
 
@@ -59,13 +64,14 @@ def accuracy(
     """
     from yarnverify.report.accuracy import accuracy_table
 
-    path, part = out / RECORD, bool(energies or variants)
+    of = of or project()
+    path, part = (of.reports if out is None else out) / RECORD, bool(energies or variants)
     if write and (check or part):
         raise InputError("--write takes the whole sweep: no energy, no --variant, no --check")
     known = read_record(path) if check else None
     if known is not None and known["profile"] != profile:
         raise InputError(f"{path}: was made with --profile {known['profile']}; compare with that one")
-    record = sweep(energies, variants, profile, executor, jobs, state, advance)
+    record = sweep(energies, variants, profile, executor, jobs, state, advance, of)
     outcome = Outcome(record)
     names = list(dict.fromkeys(cell["energy"] for cell in record["cells"]))
     for name in () if check else names:

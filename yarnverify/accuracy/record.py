@@ -20,7 +20,11 @@ _ONE = 1.0  # an error of up to one unit is as good as none
 
 
 def make_record(
-    profile: Profile, units: Sequence[Unit], results: Sequence[dict[str, Any]], missing: Sequence[str]
+    profile: Profile,
+    units: Sequence[Unit],
+    results: Sequence[dict[str, Any]],
+    missing: Sequence[str],
+    command: str = "yarnverify accuracy",
 ) -> dict[str, Any]:
     """The record of a sweep."""
     return {
@@ -28,7 +32,7 @@ def make_record(
         "profile": profile.name,
         "points": profile.count,
         "seed": units[0].seed if units else None,
-        "command": f"yarnverify accuracy --profile {profile.name} --write",
+        "command": command,
         "not_run": list(missing),
         "cells": [cell for result in results for cell in result.get("cells", ())],
         "curves": [result["curve"] for result in results if "curve" in result],

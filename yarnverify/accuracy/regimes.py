@@ -68,6 +68,15 @@ def regimes(energy: Energy) -> tuple[Regime, ...]:
     return tuple(regime for regime in REGIMES if regime.applies(shape))
 
 
+def not_drawn(energy: Energy) -> str:
+    """Why no hard cases are drawn for an energy; empty where they are."""
+    vectors = [parameter.name.label for parameter in energy.parameters if parameter.name.bold]
+    moving = [name.label for name, unit in zip(energy.unknowns, energy.units, strict=True) if unit != "m"]
+    if vectors:
+        return f"no hard cases are drawn for vector parameters ({', '.join(vectors)})"
+    return f"no hard cases are drawn for velocities ({', '.join(moving)})" if moving else ""
+
+
 def points_of(energy: Energy, regime: Regime, dtype: str, n: int, seed: int) -> Points:
     """States of a regime: the same for the same arguments, on every machine."""
     shape = shape_of(energy)
@@ -136,7 +145,7 @@ def _scalars(shape: Shape, draw: Draw, n: int, slide: Array | float = 1.0) -> di
         name.label: base + factor * rest.get(name.label, np.array(float(at))) for at, name in enumerate(shape.sliding)
     }
     for parameter in shape.energy.parameters:
-        name = str(parameter.name)
+        name = parameter.label
         found[name] = draw.uniform(0.5, 2.0, n)
         if name in shape.lengths:
             found[name] = found[name] * 0.2 + 0.9  # not below the distances that rest compares them with
@@ -156,7 +165,7 @@ def at_rest(shape: Shape, draw: Draw, n: int, frames: Array, size: Array, base: 
         else:
             found[name.label] = value * size
     for parameter in shape.energy.parameters:
-        name_ = str(parameter.name)
+        name_ = parameter.label
         found[name_] = rest[name_] * size if name_ in shape.lengths else draw.uniform(0.5, 2.0, n)
     return found
 

@@ -34,7 +34,7 @@ def parse_replay(text: str, folder: Path) -> tuple[Any, str, str, Points]:
         given = {name: _number(value) for name, _, value in (word.partition("=") for word in words[4:])}
     except ValueError as error:
         raise InputError(f"--replay: {error}") from None
-    names = [str(parameter.name) for parameter in energy.parameters]
+    names = [parameter.label for parameter in energy.parameters]
     dof = len(rows_of(energy)) - len(names)
     if len(coordinates) != dof:
         raise InputError(f"--replay: {energy.name} has {dof} coordinates, not {len(coordinates)}")
@@ -50,11 +50,11 @@ def _number(text: str) -> float:
     return float.fromhex(text) if "x" in text else float(text)
 
 
-def replay(text: str, folder: Path) -> dict[str, Any]:
+def replay(text: str, folder: Path, kernels: str = "") -> dict[str, Any]:
     """The state, and for each output its blocks: computed, true, error in units, condition number, and what the loss is."""
     energy, variant, dtype, points = parse_replay(text, folder)
     exact = truth(energy, points)
-    computed, _ = compute(kernel(variant, energy.name), points, exact, dtype)
+    computed, _ = compute(kernel(variant, energy.name, kernels), points, exact, dtype)
     rows = []
     for output in OUTPUTS:
         errors = measure(output, computed[output], exact, energy.unknowns, dtype)

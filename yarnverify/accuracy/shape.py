@@ -68,14 +68,14 @@ class Shape:
         if not names <= set(given):
             return None
         return {name: np.array(given[name], float) for name in names} | {
-            str(p.name): np.array(given.get(str(p.name), 1.0), float) for p in self.energy.parameters
+            p.label: np.array(given.get(p.label, 1.0), float) for p in self.energy.parameters
         }
 
     def pack(self, values: Mapping[str, Array], dtype: str) -> Points:
         """Points from arrays by label: (3, n) for points, (n,) for scalars; rounded to a type."""
         rows = [np.atleast_2d(values[name.label]) for name in self.energy.unknowns]
         q = np.vstack(rows).astype(dtype).astype(np.float64)
-        names = [str(parameter.name) for parameter in self.energy.parameters]
+        names = [parameter.label for parameter in self.energy.parameters]
         return Points(q, {name: values[name].astype(dtype).astype(np.float64) for name in names})
 
 
@@ -91,7 +91,7 @@ def shape_of(energy: Energy) -> Shape:
     pair = next((pair for pair in pairs if len(pair) == 2 and all(_edge(forms[name]) for name in pair)), [])
     order = [*pair, *(name for name in forms if name.bold and name not in pair)]
     edges = tuple(edge for name in order if (edge := _edge(forms[name])) is not None)
-    parameters = [(str(parameter.name), parameter.unit) for parameter in energy.parameters]
+    parameters = [(parameter.label, parameter.unit) for parameter in energy.parameters]
     others = [(name, unit) for name, unit in parameters if unit not in ("m", "1", "rad")]
     return Shape(
         energy,

@@ -16,12 +16,13 @@ from pathlib import Path
 from typing import Any
 
 from yarnverify.accuracy.cells import Unit, declared_energy, has_kernel, run_unit
-from yarnverify.accuracy.regimes import curves, regimes
+from yarnverify.accuracy.regimes import curves, not_drawn, regimes
 from yarnverify.errors import InputError, NotRunError
-from yarnverify.library import MAIN_DOCUMENT, cache_folder, derivations, fingerprint
+from yarnverify.library import cache_folder, derivations, fingerprint
 from yarnverify.symbolic.declare import load_declarations
 
 VARIANTS = ("printed", "differentiated", "fast", "accurate", "reference")
+COMPARED = ("printed", "differentiated")  # there only where a document prints the energy
 DTYPES = ("float64", "float32")
 SEED = 20140
 
@@ -66,7 +67,7 @@ def plan(
     """
     where = "" if folder is None else str(folder)
     folder = folder or derivations()
-    names = [energy.name for energy in load_declarations(folder).energies if energy.document == MAIN_DOCUMENT]
+    names = [energy.name for energy in load_declarations(folder).energies if not not_drawn(energy)]
     for name in energies:
         declared_energy(name, folder)
     for variant in variants:
@@ -75,10 +76,13 @@ def plan(
     units, missing = [], []
     for name in energies or names:
         energy = declared_energy(name, folder)
-        there = [variant for variant in variants or VARIANTS if has_kernel(variant, name)]
-        missing += [
-            f"{variant} {name}: there is no such kernel" for variant in variants or VARIANTS if variant not in there
-        ]
+        reason = not_drawn(energy)
+        if reason:
+            missing.append(f"{name}: {reason}")
+            continue
+        there = [variant for variant in variants or VARIANTS if has_kernel(variant, name, where)]
+        wanted = variants or [variant for variant in VARIANTS if energy.document or variant not in COMPARED]
+        missing += [f"{variant} {name}: there is no such kernel" for variant in wanted if variant not in there]
         if not there:
             continue
         for dtype in DTYPES:
@@ -186,7 +190,8 @@ def state_folder(units: Sequence[Unit]) -> Path:
     """Where a sweep keeps what is done: another place for another plan, other kernels, other code or other libraries."""
     package = Path(__file__).parent.parent
     code = sorted([*(package / "kernels").rglob("*.py"), *(package / "accuracy").glob("*.py")])
-    declared = sorted(Path(units[0].derivations or derivations()).glob("*.py"))
+    folder = Path(units[0].derivations or derivations())
+    declared = sorted([*folder.glob("*.py"), *(folder / "kernels").rglob("*.py")])
     plan_text = json.dumps([asdict(unit) for unit in units]) + importlib.metadata.version("numpy")
     return cache_folder() / f"accuracy-{fingerprint([plan_text.encode(), *code, *declared])[:24]}"
 

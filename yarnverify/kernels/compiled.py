@@ -32,7 +32,9 @@ BLOCK = 64  # elements whose inputs and results stay in the cache together
 _MAKING = threading.Lock()  # threads that share a batch make its loop once
 _INFIX = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
 _PREFIX = {"negative": "-", "positive": "+"}
-_CALLS = {"absolute": "abs", "sqrt": "sqrt", "arccos": "acos", "sin": "sin", "cos": "cos", "tan": "tan"}
+_CALLS = {"absolute": "abs", "sqrt": "sqrt", "arccos": "acos"} | {
+    name: name for name in ("cos", "exp", "log", "sin", "tan")
+}
 
 
 def source_of(tape: Tape, layout: str) -> str:
@@ -47,7 +49,7 @@ def source_of(tape: Tape, layout: str) -> str:
     """
     given, found = tape.inputs * BLOCK, tape.outputs * BLOCK
     body = "\n            ".join(_statements(tape))
-    return f"""from math import acos, cos, sin, sqrt, tan
+    return f"""from math import acos, cos, exp, log, sin, sqrt, tan
 
 import numpy as np
 from numba import njit, types

@@ -131,6 +131,8 @@ arccos = _one_of("arccos", math.acos)
 sin = _one_of("sin", math.sin)
 cos = _one_of("cos", math.cos)
 tan = _one_of("tan", math.tan)
+exp = _one_of("exp", math.exp)
+log = _one_of("log", math.log)
 maximum = _one_of("maximum", max)
 select = _one_of("select", lambda condition, yes, no: yes if condition > 0 else no)
 

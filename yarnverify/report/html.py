@@ -30,7 +30,7 @@ _PARTS = (  # anchor and heading, in reading order
 )
 
 
-def page(records: dict[str, Any], pictures: Mapping[str, str]) -> str:
+def page(records: dict[str, Any], pictures: Mapping[str, str], name: str = "") -> str:
     """The whole report.
 
     Parameters
@@ -39,6 +39,8 @@ def page(records: dict[str, Any], pictures: Mapping[str, str]) -> str:
         As for :func:`yarnverify.report.pages.pages`.
     pictures
         Name without suffix to SVG text, of those that were drawn.
+    name
+        What the command line calls the folder that it is about; empty for the one that comes with the package.
     """
     found, derived = records["verdicts"], records["derivations"]
     templates = Environment(
@@ -51,6 +53,7 @@ def page(records: dict[str, Any], pictures: Mapping[str, str]) -> str:
     templates.filters["math"] = lambda latex: Markup(formula(latex))
     templates.filters["powers"] = _powers
     templates.globals.update(sign=_SIGN, worst_verdict=_worst, where=where)
+    templates.globals.update(argument=f" {name}" if name else "", prefix=f"{name}/" if name else "")
     return templates.get_template("report.html.jinja").render(
         parts=_PARTS,
         style=Markup((_FOLDER / "templates" / "page" / "report.css").read_text(encoding="utf-8")),

@@ -20,7 +20,9 @@ _TEMPLATES = Environment(
 )
 
 
-def pages(records: dict[str, Any], pictures: Sequence[str] = ()) -> dict[str, str]:
+def pages(
+    records: dict[str, Any], pictures: Sequence[str] = (), source: str = "../derivations", name: str = ""
+) -> dict[str, str]:
     """File name to text: an index, and a page an energy.
 
     Parameters
@@ -30,28 +32,39 @@ def pages(records: dict[str, Any], pictures: Sequence[str] = ()) -> dict[str, st
         ``accuracy`` and ``benchmark`` where measured.
     pictures
         Names of the pictures that are in ``pictures/``.
+    source
+        The folder with the document, as seen from the pages.
+    name
+        What the command line calls that folder; empty for the one that comes with the package.
     """
+    place = {"source": source, "argument": f" {name}" if name else "", "prefix": f"{name}/" if name else ""}
     found, derived = records["verdicts"], records["derivations"]
     texts = {
         "README.md": _render(
-            "index.md.jinja", found=found, derived=derived, rows=_rows(found, ""), mistakes=mistakes(found, None)
+            "index.md.jinja",
+            found=found,
+            derived=derived,
+            rows=_rows(found, ""),
+            mistakes=mistakes(found, None),
+            place=place,
         )
     }
-    for name, derivation in derived.items():
+    for energy, derivation in derived.items():
         section = derivation["section"]
-        texts[f"{name}.md"] = _render(
+        texts[f"{energy}.md"] = _render(
             "energy.md.jinja",
-            name=name,
+            name=energy,
             section=section,
             found=found,
             derivation=derivation,
             rows=_rows(found, section),
-            mistakes=mistakes(found, section),
+            mistakes=mistakes(found, section) if section else [],
             completeness=next((part for part in found["completeness"] if part["section"] == section), None),
-            kernels=records["kernels"].get(name, {}),
-            accuracy=_accuracy(records.get("accuracy"), name),
-            benchmark=_benchmark(records.get("benchmark"), name),
+            kernels=records["kernels"].get(energy, {}),
+            accuracy=_accuracy(records.get("accuracy"), energy),
+            benchmark=_benchmark(records.get("benchmark"), energy),
             pictures=pictures,
+            place=place,
         )
     return dict(sorted(texts.items()))
 

@@ -17,12 +17,13 @@ import inspect
 import re
 import traceback
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_type_hints
 
 from yarnverify.errors import InputError
 from yarnverify.source import Source
+from yarnverify.symbolic.latex import ACCENTS
 from yarnverify.symbolic.reader import parse
 from yarnverify.symbolic.tree import PI, Expr, Name, ShapeError, Type, as_expr, type_of
 
@@ -92,6 +93,33 @@ def angle(a: Expr, b: Expr) -> Expr:
     return Expr("call", (Expr("mul", (unit(a).T, unit(b))),), "arccos")
 
 
+def dot(a: Expr, b: Expr) -> Expr:
+    """Scalar product of two vectors."""
+    return Expr("mul", (a.T, b))
+
+
+def cross(a: Expr, b: Expr) -> Expr:
+    """Vector product."""
+    return Expr("cross", (a, b))
+
+
+def _function(name: str, what: str) -> Callable[[Expr | int], Expr]:
+    def function(value: Expr | int) -> Expr:
+        return Expr("sqrt", (as_expr(value),)) if name == "sqrt" else Expr("call", (as_expr(value),), name)
+
+    function.__name__, function.__doc__ = name, what
+    return function
+
+
+sqrt = _function("sqrt", "Square root of a scalar.")
+sin = _function("sin", "Sine of an angle in radians.")
+cos = _function("cos", "Cosine of an angle in radians.")
+tan = _function("tan", "Tangent of an angle in radians.")
+arccos = _function("arccos", "Angle from 0 to pi with a given cosine.")
+log = _function("log", "Natural logarithm of a positive scalar.")
+exp = _function("exp", "Exponential of a scalar.")
+
+
 def deviation(a: Expr, b: Expr) -> Expr:
     """How much the angle between two directions exceeds a right angle, from -pi/2 to pi/2."""
     return angle(a, b) - PI / 2
@@ -102,6 +130,11 @@ class Parameter:
     name: Name
     unit: str
     positive: bool
+
+    @property
+    def label(self) -> str:
+        """Its argument in a kernel, such as ``k_b``."""
+        return self.name.identifier
 
 
 @dataclass(frozen=True)
@@ -134,6 +167,8 @@ class Energy:
         What holds outside the domain: ``error``, or ``zero`` for an energy that does not act there.
     unchanged
         Motions that leave the energy as it is: ``translation``, ``rotation``, ``sliding`` (all sliding coordinates together).
+    place
+        File, line and column of its declaration.
     """
 
     name: str
@@ -151,6 +186,12 @@ class Energy:
     rest: dict[str, Any] = field(default_factory=dict)
     elsewhere: str = "error"
     unchanged: tuple[str, ...] = ()
+    place: tuple[str, int, int] = field(default=("", 1, 1), compare=False)
+
+    @property
+    def file(self) -> str:
+        """Name of the file that declares it."""
+        return Path(self.place[0]).name
 
 
 @dataclass(frozen=True)
@@ -182,11 +223,26 @@ _INDEXED = re.compile(r"([A-Za-z]+?)_?(\d+|[ij])\Z")
 
 
 def name_of(identifier: str, bold: bool = False, indexed: bool = False) -> Name:
-    """The symbol that a Python identifier stands for: ``x1`` is x_1, ``k_b`` is k_b, ``theta_0`` is theta_0."""
+    """The symbol that a Python identifier stands for: ``x1`` is x_1, ``k_b`` is k_b, ``bar_l`` is an l with a bar."""
     if indexed and (match := _INDEXED.match(identifier)):
         return Name(match[1], match[2], bold)
+    accent, _, rest = identifier.partition("_")
+    if accent in ACCENTS and rest:  # bar_l is \bar{l}
+        inner = name_of(rest, bold, indexed)
+        return replace(inner, base=f"{accent} {inner.base}")
     base, _, sub = identifier.partition("_")
     return Name(base, sub, bold)
+
+
+def place_of(function: Callable[..., Any]) -> tuple[str, int, int]:
+    """Where a function begins: its ``def``, below any decorators."""
+    code = function.__code__
+    try:
+        lines, first = inspect.getsourcelines(function)
+    except (OSError, TypeError):  # not from a file
+        return code.co_filename, code.co_firstlineno, 1
+    below = next((i for i, line in enumerate(lines) if line.lstrip().startswith("def ")), 0)
+    return code.co_filename, first + below, 1
 
 
 def _unknowns(function: Callable[..., Any], hints: dict[str, Any]) -> dict[str, Expr]:
@@ -277,7 +333,7 @@ def energy(
             name, document, section, unit, inspect.getdoc(function) or "",
             tuple(node.name for node in unknowns.values()), tuple(_KINDS[hints[key]][1] for key in unknowns),
             tuple(parameters.values()),
-            expression, tuple(where), removable, singular, rest or {}, elsewhere, unchanged,
+            expression, tuple(where), removable, singular, rest or {}, elsewhere, unchanged, place_of(function),
         )  # fmt: skip
 
     return declare
@@ -357,7 +413,7 @@ def load_declarations(folder: Path) -> Declarations:
 
 
 __all__ = [
-    "Assumption", "Declarations", "Energy", "Motion", "Parameter", "Point", "Positive", "Quantity", "Real", "Sliding",
-    "SlidingSpeed", "Vector", "Velocity", "angle", "assumptions", "deviation", "energy", "length", "load_declarations",
-    "name_of", "quantity", "square", "unchanged_by", "unit",
+    "PI", "Assumption", "Declarations", "Energy", "Motion", "Parameter", "Point", "Positive", "Quantity", "Real", "Sliding",
+    "SlidingSpeed", "Vector", "Velocity", "angle", "arccos", "assumptions", "cos", "cross", "deviation", "dot", "energy", "exp",
+    "length", "load_declarations", "log", "name_of", "quantity", "sin", "sqrt", "square", "tan", "unchanged_by", "unit",
 ]  # fmt: skip

@@ -7,7 +7,6 @@ output does not need is dropped when the code is recorded (``kernels.tape``), no
 
 from __future__ import annotations
 
-import keyword
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -28,9 +27,7 @@ Formulas = Mapping[Expr, Expr]  # what each force and Jacobian node stands for
 
 def identifier(name: Name) -> str:
     """A symbol as a Python name."""
-    text = f"{name.base}_{name.sub}" if name.sub else name.base
-    text = "".join(c if c.isalnum() else "_" for c in text)
-    return text + "_" if keyword.iskeyword(text) else text
+    return name.identifier
 
 
 def row_symbols(name: Name) -> list[sp.Symbol]:
@@ -90,6 +87,12 @@ class Components(Reading):
 
     def arccos(self, cosine: Any) -> Any:
         return sp.acos(cosine)
+
+    def log(self, value: Any) -> Any:
+        return sp.log(value)
+
+    def exp(self, value: Any) -> Any:
+        return sp.exp(value)
 
     def circle(self, angle: Any) -> tuple[Any, Any]:
         return self.hold(sp.sin(angle)), self.hold(sp.cos(angle))
@@ -371,12 +374,18 @@ class _Printer(NumPyPrinter):  # type: ignore[misc]
     def _print_sign(self, expr: Any) -> str:
         return f"select({self._print(expr.args[0])}, 1.0, -1.0)"
 
+    def _print_exp(self, expr: Any) -> str:
+        return f"exp({self._print(expr.args[0])})"
+
+    def _print_log(self, expr: Any) -> str:
+        return f"log({self._print(expr.args[0])})"
+
     def _print_Function(self, expr: Any) -> str:
         return f"{expr.func.__name__}({', '.join(self._print(arg) for arg in expr.args)})"
 
 
 _PRINTER = _Printer({"fully_qualified_modules": False})
-LIBRARY = {"arccos", "sin", "cos", "tan"}  # not correctly rounded, so not the same on every machine
+LIBRARY = {"arccos", "cos", "exp", "log", "sin", "tan"}  # not correctly rounded, so not the same on every machine
 _FUNCTIONS = {
     "tape": LIBRARY | {"power", "select", "sqrt"},
  "geometry": {

@@ -7,7 +7,7 @@ from typing import Any
 
 from yarnverify.errors import InputError
 from yarnverify.library import derivations
-from yarnverify.symbolic.court import Court, Verdict
+from yarnverify.symbolic.court import Verdict
 from yarnverify.symbolic.declare import Declarations, Energy, load_declarations
 from yarnverify.symbolic.derive import Derivation, declared_section, derive_declared
 from yarnverify.symbolic.invariants import prove_invariants
@@ -153,13 +153,12 @@ def _result(derivation: Derivation) -> list[Step]:
 
 
 def _plain_steps(energy: Energy) -> list[Step]:
-    court = Court(declared_section(energy), energy.expression)
-    blocks = [Expr("force", value=name) for name in energy.unknowns]
-    values = [
-        (latex(b), f"{plain(b)}: exact, {len(court.names)} symbols") for b in blocks if court.block(b) is not None
-    ]
-    note = "This energy is not a law of known measures: it is differentiated coordinate by coordinate."
-    return [_step("Plain differentiation", note, values)]
+    count = sum(3 if name.bold else 1 for name in energy.unknowns)
+    note = (
+        "This energy is not a law of known measures, which are lengths of segments and angles between them: it is "
+        f"differentiated by each of its {count} coordinates, through every sum and function that it is made of."
+    )
+    return [_step("Plain differentiation", note, [])]
 
 
 def _plain_proofs(energy: Energy) -> dict[str, str]:

@@ -20,6 +20,7 @@ import flint
 import numpy as np
 
 from yarnverify.symbolic.document import Section
+from yarnverify.symbolic.exponentials import NAMES
 from yarnverify.symbolic.jets import Jet
 from yarnverify.symbolic.numbers import Algebraic, Balls, Floats, Number, UndefinedError
 from yarnverify.symbolic.tree import FORCE, ZERO, Expr, Name
@@ -137,6 +138,8 @@ class Evaluation:
         if op == "identity":
             constant = self.numbers.constant
             return np.array([[constant(Fraction(int(i == j))) for j in range(3)] for i in range(3)], dtype=object)
+        if op == "call" and expr.value in NAMES:
+            return self._exponential(str(expr.value), self._value(expr.args[0], jets))
         if op == "call" and expr.value != "arccos":
             sine, cosine = self._circle(expr.args[0], jets)
             return {"sin": lambda: sine, "cos": lambda: cosine, "tan": lambda: sine / _nonzero(cosine)}[
@@ -212,6 +215,15 @@ class Evaluation:
         sine = self.numbers.sqrt(1 - cosine * cosine)
         slope = -1 / _nonzero(sine)
         return value.chain(angle, slope, cosine * slope * slope * slope)
+
+    def _exponential(self, function: str, value: Any) -> Any:
+        """A logarithm or an exponential."""
+        inner = Jet._lift(value).value
+        result = self.numbers.log(inner) if function == "log" else self.numbers.exp(inner)
+        if not isinstance(value, Jet):
+            return result
+        slope = 1 / inner if function == "log" else result
+        return value.chain(result, slope, -slope * slope if function == "log" else result)
 
     def _cosine_of(self, expr: Expr) -> Expr | None:
         """The tree under the arc cosine of which this one is an even positive power; None if it is anything else."""

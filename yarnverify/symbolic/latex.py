@@ -62,7 +62,8 @@ def _bare(expr: Expr) -> bool:
 
 def _call(expr: Expr, power: str = "") -> str:
     arg = expr.args[0]
-    return f"\\{expr.value}{power} {latex(arg) if _bare(arg) else _group(arg)}"
+    name = "ln" if expr.value == "log" else expr.value
+    return f"\\{name}{power} {latex(arg) if _bare(arg) else _group(arg)}"
 
 
 def _bars(expr: Expr, bar: str) -> str:

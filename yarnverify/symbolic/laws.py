@@ -53,7 +53,7 @@ class Law:
             case "call":
                 if expr.value == "arccos":
                     return self._angle(args[0])
-                function = {"sin": sp.sin, "cos": sp.cos, "tan": sp.tan}[str(expr.value)]
+                function = {"sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "log": sp.log, "exp": sp.exp}[str(expr.value)]
                 return function(self.scalar(args[0]))
         raise NoMeasuresError
 

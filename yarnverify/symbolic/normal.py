@@ -157,6 +157,8 @@ class Field(Reading):
         self._factored: dict[Poly, tuple[Any, tuple[tuple[Poly, int], ...]]] = {}
         self._angles: list[tuple[Quotient, Quotient]] = []  # (cosine, angle)
         self._circles: list[tuple[Quotient, Quotient, Quotient]] = []  # (angle, sine, cosine)
+        self._logs: list[tuple[Quotient, Quotient]] = []
+        self._exponentials: list[tuple[Quotient, Quotient]] = []
         self._derivatives: dict[tuple[str, Name, int], Quotient] = {}
         self._direction = {name: [self._make(f"{name.label}.{axis}") for axis in "xyz"] for name in self._points[1:]}
         for name in self._points[1:]:
@@ -424,6 +426,50 @@ class Field(Reading):
         self._angles.append((cosine, angle))
         return angle
 
+    def log(self, value: Quotient) -> Quotient:
+        """Logarithm: the sum of those of the factors, where each of them is positive."""
+        content, parts = self.factor(value.numerator)
+        signed = [(part, power) for part, power in (*parts, *((p, -e) for p, e in value.factors))]
+        signs = [self.sign(part) for part, _ in signed]
+        if content < 0 and signs.count(-1) % 2 == 1:  # an odd number of turned signs makes up for it
+            content = -content
+        elif content < 0 or signs.count(-1) % 2 == 1 or 0 in signs:
+            return self._log_of(value)
+        total = self.constant(0)
+        for prime, power in _prime_powers(content):
+            total = total + self._log_of(self.constant(QQ(prime))) * power
+        for (part, power), sign in zip(signed, signs, strict=True):
+            total = total + self._log_of(Quotient(self, part) * sign) * power
+        return total
+
+    def _log_of(self, value: Quotient) -> Quotient:
+        for known, found in self._logs:
+            if (known - value).is_zero:
+                return found
+
+        def rule(label: str, unknown: Name, axis: int) -> Quotient:
+            return self.derivative(value, unknown, axis) / value
+
+        found = self._make(self._atom(None, rule, positive=False))
+        self._logs.append((value, found))
+        return found
+
+    def exp(self, value: Quotient) -> Quotient:
+        """Exponential: whole multiples of one exponent are powers of one generator."""
+        if value.is_zero:
+            return self.constant(1)
+        for known, found in self._exponentials:
+            for times in (1, -1, 2, -2, 3, -3):
+                if (known * times - value).is_zero:
+                    return found**times
+
+        def rule(label: str, unknown: Name, axis: int) -> Quotient:
+            return self._make(label) * self.derivative(value, unknown, axis)
+
+        found = self._make(self._atom(None, rule, positive=True))
+        self._exponentials.append((value, found))
+        return found
+
     @cached_property
     def pi(self) -> Quotient:
         return self._make(self._atom(None, lambda label, unknown, axis: self.constant(0), positive=True))
@@ -555,15 +601,18 @@ def _rational(value: flint.fmpq) -> Any:
     return QQ(int(value.p), int(value.q))
 
 
-def _rational_root(value: Any) -> tuple[Any, Any]:
-    """A positive rational as (root of its square part, rest)."""
+def _prime_powers(value: Any) -> list[tuple[int, int]]:
+    """Prime factors of a positive rational."""
     from sympy import factorint
 
+    below = [(prime, -power) for prime, power in factorint(value.denominator).items()]
+    return [*factorint(value.numerator).items(), *below]
+
+
+def _rational_root(value: Any) -> tuple[Any, Any]:
+    """A positive rational as (root of its square part, rest)."""
     outside, inside = QQ(1), QQ(1)
-    for prime, power in [
-        *factorint(value.numerator).items(),
-        *((p, -e) for p, e in factorint(value.denominator).items()),
-    ]:
+    for prime, power in _prime_powers(value):
         outside *= QQ(prime) ** (power // 2)
         inside *= QQ(prime) ** (power % 2)
     return outside, inside

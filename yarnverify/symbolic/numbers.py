@@ -14,6 +14,8 @@ from typing import Any
 import flint
 import numpy as np
 
+from yarnverify.symbolic.exponentials import Drawn
+
 _MOST_ROOTS = 4
 _NEAR = 2.0**-7  # where the series converges fast, and the closed forms begin to cancel
 Number = Any  # flint.fmpq, Algebraic, flint.arb or float
@@ -120,6 +122,7 @@ class Rationals:
         self._angles: dict[Number, Number] = {}
         self._circles: dict[Number, tuple[Number, Number]] = {}
         self.pi = self._beside(flint.arb.pi())
+        self._transcendental = Drawn(self._beside)
 
     def _beside(self, value: Any) -> Number:
         """A rational number beside a ball, over a drawn denominator."""
@@ -186,6 +189,14 @@ class Rationals:
         """Whether an angle was drawn for this cosine, rather than for its negative."""
         return cosine in self._angles or -cosine not in self._angles
 
+    def log(self, value: Number) -> Number:
+        if not self.positive(value):
+            raise NoValueError("logarithm of what is not positive")
+        return self._transcendental.log(value, self._approximate(value))
+
+    def exp(self, value: Number) -> Number:
+        return self._transcendental.exp(value, self._approximate(value))
+
     def circle(self, angle: Number) -> tuple[Number, Number]:
         """A rational point of the unit circle, drawn for an angle that no arc cosine explains."""
         if angle not in self._circles:
@@ -234,6 +245,16 @@ class Balls:
     def circle(self, angle: Number) -> tuple[Number, Number]:
         return angle.sin(), angle.cos()
 
+    def log(self, value: Number) -> Number:
+        if value <= 0:
+            raise NoValueError("logarithm of what is not positive")
+        if not value > 0:
+            raise UndefinedError("logarithm of what may be zero")
+        return value.log()
+
+    def exp(self, value: Number) -> Number:
+        return value.exp()
+
     @staticmethod
     def squared_arccos(cosine: Number) -> tuple[Number, Number, Number]:
         """``arccos(c)^2`` with its first two derivatives by c: an analytic function at c = 1, and beyond.
@@ -274,3 +295,9 @@ class Floats:
 
     def circle(self, angle: Number) -> tuple[Number, Number]:
         return math.sin(angle), math.cos(angle)
+
+    def log(self, value: Number) -> Number:
+        return math.log(value)
+
+    def exp(self, value: Number) -> Number:
+        return math.exp(value)

@@ -331,7 +331,8 @@ class _Build(Transformer[Token, Any]):
         return self._node(meta, "derivative", items[0], value=items[1].name)
 
     def call(self, meta: Meta, items: list[Any]) -> Expr:
-        return self._node(meta, "call", items[1], value=str(items[0])[1:])
+        name = str(items[0])[1:]
+        return self._node(meta, "call", items[1], value="log" if name == "ln" else name)
 
     def call_power(self, meta: Meta, items: list[Any]) -> Expr:
         return self._node(meta, "pow", self.call(meta, [items[0], items[2]]), value=int(items[1][-1]))

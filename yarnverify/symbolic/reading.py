@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from yarnverify.symbolic.document import Section
+from yarnverify.symbolic.exponentials import NAMES
 from yarnverify.symbolic.tree import Expr, Name
 
 Value = Any
@@ -46,6 +47,12 @@ class Reading(ABC):
     @abstractmethod
     def circle(self, angle: Any) -> tuple[Any, Any]:
         """Sine and cosine."""
+
+    def log(self, value: Any) -> Any:
+        raise UnsupportedError("a logarithm")
+
+    def exp(self, value: Any) -> Any:
+        raise UnsupportedError("an exponential")
 
     pi: Any
 
@@ -120,6 +127,8 @@ class Reading(ABC):
             case "call":
                 if expr.value == "arccos":
                     return self.arccos(values[0])
+                if expr.value in NAMES:
+                    return self.log(values[0]) if expr.value == "log" else self.exp(values[0])
                 sine, cosine = self.circle(values[0])
                 return {"sin": lambda: sine, "cos": lambda: cosine, "tan": lambda: sine / cosine}[str(expr.value)]()
         raise AssertionError(f"no such operation: {op}")

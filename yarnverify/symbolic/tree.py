@@ -6,6 +6,7 @@ The order of factors is kept, because vectors, covectors (rows) and 3x3 matrices
 
 from __future__ import annotations
 
+import keyword
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -37,6 +38,12 @@ class Name:
     def label(self) -> str:
         """Short form used in the names of blocks and degrees of freedom, such as ``x1``."""
         return f"{self.base}{self.sub}".replace(" ", "")
+
+    @property
+    def identifier(self) -> str:
+        """The symbol as a Python name, such as ``k_b`` or ``bar_l``."""
+        text = "".join(c if c.isalnum() else "_" for c in str(self))
+        return text + "_" if keyword.iskeyword(text) else text
 
     def with_sub(self, sub: str) -> Name:
         return replace(self, sub=sub)
