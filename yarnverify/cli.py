@@ -472,6 +472,44 @@ def simulate(
 
 
 @app.command
+def analyse(
+    scene: str | None = None,
+    /,
+    *,
+    settings: Annotated[
+        list[str] | None,
+        Parameter(name="--set", help="A parameter, name=value.", consume_multiple=True, negative=""),
+    ] = None,
+    size: Annotated[int | None, Parameter(help="Size of the scene; by default its smallest.")] = None,
+    modes: Annotated[int, Parameter(help="How many modes of the scene.")] = 6,
+    out: Annotated[Path, Parameter(help="Folder of reports that holds the record.")] = Path("reports"),
+    write: Annotated[bool, Parameter(negative="", help="Write the record.")] = False,
+    json_file: Json = None,
+) -> None:
+    """Where energies are unstable, largest explicit steps, vibrations and moduli of a cotton weave; or the modes of a scene.
+
+    Parameters
+    ----------
+    scene
+        A scene, or a Python file that declares one: its vibration modes, and nothing else.
+    """
+    from yarnverify.analysis import command
+    from yarnverify.report.analysis import analysis_lines, mode_lines
+
+    with progress("analysing") as advance:
+        if scene is not None:
+            record = command.scene_modes(scene, settings or (), size, modes, advance)
+            lines = mode_lines(record)
+        else:
+            record = command.analysis(settings or (), advance)
+            lines = analysis_lines(record)
+    if write and scene is None:
+        lines = [*lines, command.write(record, out)]
+    if not _json(record, json_file):
+        print("\n".join(lines))
+
+
+@app.command
 def export(
     energy: str,
     /,
