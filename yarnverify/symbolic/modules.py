@@ -11,13 +11,13 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from yarnverify.errors import InputError, NotRunError
+from yarnverify.errors import NotRunError
 from yarnverify.source import load
 from yarnverify.symbolic.angles import prove_derivatives, prove_recurrence, turning_series
 from yarnverify.symbolic.court import Court, Finding, Verdict
 from yarnverify.symbolic.declare import Declarations, Energy, load_declarations
 from yarnverify.symbolic.derive import Derivation, declared_section, derive_declared
-from yarnverify.symbolic.dimensions import DimensionError, check_dimensions, dimension_of_unit
+from yarnverify.symbolic.dimensions import dimension_of_unit
 from yarnverify.symbolic.document import Claim, Document, Section, block_of
 from yarnverify.symbolic.emit import (
     LIBRARY,
@@ -110,10 +110,6 @@ def kernel_modules(
     record: dict[str, Any] = {}
     missing: list[str] = []
     for energy in energies:
-        try:
-            check_dimensions(energy)
-        except DimensionError as error:
-            raise InputError(f"{energy.name}: {error}", energy.place) from None
         derived = proved(energy, declarations)
         for variant in variants_of(energy):
             advance(f"{energy.name}, {variant}", len(planned))
@@ -127,9 +123,14 @@ def kernel_modules(
                 programs = [made]
             else:
                 programs, notes = derived_programs(energy, derived, variant)
+            if variant == "reference" and (called := library_calls(programs)):
+                missing.append(
+                    f"{energy.name}: no variant in twice the digits: there is no {' and no '.join(called)} in these"
+                )
+                continue
             sources = [energy.file, *([document] if variant == "printed" else [])]
             place = "derivations/" if package else ""
-            text, counts = module_text(energy, variant, programs, [place + name for name in sources], notes)
+            text, counts = module_text(energy, variant, programs, [place + name for name in sources], notes, derived)
             texts[f"{variant}/{energy.name}.py"] = text
             record.setdefault(energy.name, {})[variant] = counts
         texts[f"{energy.name}.py"] = _face(energy, default, package)
@@ -310,7 +311,7 @@ def _title(energy: Energy) -> str:
 
 
 def module_text(
-    energy: Energy, variant: str, programs: list[Program], sources: list[str], notes: list[str]
+    energy: Energy, variant: str, programs: list[Program], sources: list[str], notes: list[str], found: Proved
 ) -> tuple[str, dict[str, int]]:
     """The text of one kernel module, and its operation counts."""
     dofs = dof_labels(energy.unknowns)
@@ -350,6 +351,7 @@ def module_text(
         "functions": functions,
         "scaling": "points" if angles_alone else "lengths",
         "portable": not LIBRARY & set(tape),
+        "promise": promise(variant, found, bool(LIBRARY & set(tape))),
         "numbers": "double-double" if variant == "reference" else "float",
         "public": (
             ("energy", "(n,)", "Energy of each element", energy.unit, "Array"),
@@ -373,6 +375,19 @@ def module_text(
         for shape, found in counts.items()
     )
     return template.render(counts=shown, **values), next(iter(counts.values()))
+
+
+def library_calls(programs: list[Program]) -> list[str]:
+    """The functions of a mathematical library that programs call."""
+    code = "\n".join(line for made in programs for line in (*statements(made), *map(text_of, made.outputs)))
+    return sorted(LIBRARY & set(used_functions(code, "tape")))
+
+
+def promise(variant: str, found: Proved, calls: bool) -> str:
+    """What errors a kernel promises; see ``runtime.Kernel``."""
+    if variant in ("differentiated", "printed") or not (found.shapes or found.stages):
+        return "none"
+    return "units" if variant == "reference" or (variant == "accurate" and found.shapes and not calls) else "condition"
 
 
 def _operations(text: str, name: str) -> dict[str, dict[str, int]]:

@@ -41,8 +41,12 @@ def scalar_tree(value: Any) -> Expr:
             return _product([whole, Expr("sqrt", (scalar_tree(value.base),))])
         if value.exp.is_Integer:
             return Expr("pow", (scalar_tree(value.base),), int(value.exp))
-    if isinstance(value, sp.sin | sp.cos | sp.tan | sp.log | sp.exp):
-        return Expr("call", (scalar_tree(value.args[0]),), type(value).__name__)
+    if isinstance(value, sp.sin | sp.cos | sp.tan | sp.log) or type(value).__name__ == "exponential":
+        return Expr(
+            "call",
+            (scalar_tree(value.args[0]),),
+            "exp" if type(value).__name__ == "exponential" else type(value).__name__,
+        )
     if isinstance(value, sp.sign):
         return scalar_tree(value.args[0]) / Expr("abs", (scalar_tree(value.args[0]),))
     if isinstance(value, sp.Abs):
