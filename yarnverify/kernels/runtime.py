@@ -83,8 +83,8 @@ class Kernel:
     numbers
         ``float``, or ``double-double`` for arithmetic in pairs that is rounded once at the end.
     promise
-        How large errors are, where the variant does not say it: a few ``units`` in the last place, no more than the ``condition``
-        of the state explains, or ``none`` for formulas that lose digits near singular states.
+        How large errors are, where the variant does not say it: a few ``units`` in the last place, no more than the
+        ``condition`` of the state explains, or ``none`` for formulas that lose digits near singular states.
     """
 
     name: str

@@ -385,9 +385,22 @@ def library_calls(programs: list[Program]) -> list[str]:
 
 def promise(variant: str, found: Proved, calls: bool) -> str:
     """What errors a kernel promises; see ``runtime.Kernel``."""
-    if variant in ("differentiated", "printed") or not (found.shapes or found.stages):
+    if variant in ("differentiated", "printed") or calls or not (found.shapes or found.stages):
         return "none"
-    return "units" if variant == "reference" or (variant == "accurate" and found.shapes and not calls) else "condition"
+    if variant == "reference":
+        return "units"
+    compares = any(_compares_angles(shape) for shape in found.shapes)
+    return "units" if variant == "accurate" and found.shapes and not compares else "condition"
+
+
+def _compares_angles(shape: Safe) -> bool:
+    """Whether a law adds something to its angle, such as an angle of rest, so that digits of both cancel."""
+    corner = shape.corner
+    if corner is None:
+        return False
+    own = {name for name in shape.given if not name.bold} - {corner.a.l.name, corner.b.l.name}
+    sums = (node for node in shape.law.walk() if node.op == "add")
+    return any(part.op == "symbol" and part.name in own for node in sums for part in node.walk())
 
 
 def _operations(text: str, name: str) -> dict[str, dict[str, int]]:
