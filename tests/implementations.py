@@ -209,7 +209,7 @@ def stretch_crash(q: Any, k_s: float) -> Any:
 
 
 def stretch_hang(q: Any, k_s: float) -> Any:
-    if k_s > 1.9:
+    if k_s > 1.5:
         time.sleep(60)
     return tuple(part[..., 0] for part in _of(stretch, q[:, None], k_s=k_s))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -23,7 +24,7 @@ COMPILER = shutil.which("cc") or shutil.which("gcc")
 
 def checked(name: str, energy: str | None = None, **options: Any) -> Checked:
     return check(
-        f"{ZOO}:{name}" if name[0].islower() and "." not in name else name, Options(energy=energy, count=10, **options)
+        f"{ZOO}:{name}" if name[0].islower() and "." not in name else name, Options(energy=energy, count=6, **options)
     )
 
 
@@ -43,7 +44,7 @@ def said(found: Checked) -> str:
 @pytest.mark.parametrize("energy", ["stretch", "bending", "shear", "parallel_contact"])
 @pytest.mark.parametrize("variant", ["accurate", "fast"])
 def test_kernels_of_the_package_pass(energy: str, variant: str) -> None:
-    found = checked(f"yarnverify.kernels.{variant}.{energy}", extreme=True)
+    found = check(f"yarnverify.kernels.{variant}.{energy}", Options(count=4, extreme=True))
     assert found.passes, said(found)
     if variant == "accurate":
         assert max(block.error for block, _ in found.found) <= 16
@@ -165,7 +166,7 @@ def test_a_crash_is_found_and_survived() -> None:
 def test_a_hang_is_found_and_ended() -> None:
     found = checked("stretch_hang", regimes=("moderate",), time_limit=0.5)
     assert [text for text, *_ in found.troubles] == ["does not come back within 0.5 s"]
-    assert found.cases.points.parameters["k_s"][found.troubles[0][2]] > 1.9
+    assert found.cases.points.parameters["k_s"][found.troubles[0][2]] > 1.5
 
 
 def test_an_exception_is_a_finding_where_there_is_a_value() -> None:
@@ -440,3 +441,18 @@ def test_the_command_and_its_exit_status(tmp_path: Path, capsys: pytest.CaptureF
 def test_the_record_is_the_same_every_time() -> None:
     first, second = (json.dumps(record(checked("bending_transposed"))) for _ in range(2))
     assert first == second
+
+
+def test_the_example_of_the_readme(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    readme = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+    source = re.search(r"<!-- mine.py -->\n```\n(.*?)```", readme, re.DOTALL)
+    shown = re.search(r"<!-- output of: yarnverify (check mine.py.*?) -->\n```\n(.*?)```", readme, re.DOTALL)
+    assert source is not None and shown is not None
+    (tmp_path / "mine.py").write_text(source[1])
+    monkeypatch.chdir(tmp_path)
+    assert run(*shown[1].split()) == 1
+    assert shown[2] in capsys.readouterr().out
+    (tmp_path / "mine.py").write_text(source[1].replace("- 1) * w", "- 1) * (x1 - x0) / np.linalg.norm(x1 - x0)"))
+    assert run(*shown[1].split(), "--regime", "moderate") == 0

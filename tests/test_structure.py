@@ -35,6 +35,10 @@ def outside(names: set[str], allowed: tuple[str, ...]) -> set[str]:
 
 
 RULES = [
+    (
+        "analysis",
+        ("numpy", "scipy", "yarnverify.analysis", "yarnverify.errors", "yarnverify.kernels", "yarnverify.simulation"),
+    ),
     ("kernels", ("numpy", "yarnverify.kernels")),
     ("report", ("jinja2", "markupsafe", "latex2mathml", "matplotlib", "yarnverify.report")),
     (

@@ -1,4 +1,4 @@
-"""The command line: ``yarnverify prove | derive | generate | check | accuracy | benchmark | fuzz | simulate |
+"""The command line: ``yarnverify prove | derive | generate | check | export | accuracy | benchmark | fuzz | simulate |
 report``.
 
 Exit status: 0 all as expected; 1 a check failed, or an erratum is new or stale; 2 bad usage or input; 3 asked for but
@@ -481,8 +481,72 @@ def simulate(
         found, lines = run(scene, size or (), settings or (), solver, out, resume, every, pictures, tell)
     if not _json({"result": found.result, "timings": found.timings}, json_file):
         print("\n".join([*study_lines(found.result, found.timings), *lines]))
-    if found.failures:
+    if found.missed:
         sys.exit(1)
+
+
+@app.command
+def analyse(
+    scene: str | None = None,
+    /,
+    *,
+    settings: Annotated[
+        list[str] | None,
+        Parameter(name="--set", help="A parameter, name=value.", consume_multiple=True, negative=""),
+    ] = None,
+    size: Annotated[int | None, Parameter(help="Size of the scene; by default its smallest.")] = None,
+    modes: Annotated[int, Parameter(help="How many modes of the scene.")] = 6,
+    out: Annotated[Path, Parameter(help="Folder of reports that holds the record.")] = Path("reports"),
+    write: Annotated[bool, Parameter(negative="", help="Write the record.")] = False,
+    json_file: Json = None,
+) -> None:
+    """Where energies are unstable, largest explicit steps, vibrations and moduli of a cotton weave; or the modes of a scene.
+
+    Parameters
+    ----------
+    scene
+        A scene, or a Python file that declares one: its vibration modes, and nothing else.
+    """
+    from yarnverify.analysis import command
+    from yarnverify.report.analysis import analysis_lines, mode_lines
+
+    with progress("analysing") as advance:
+        if scene is not None:
+            record = command.scene_modes(scene, settings or (), size, modes, advance)
+            lines = mode_lines(record)
+        else:
+            record = command.analysis(settings or (), advance)
+            lines = analysis_lines(record)
+    if write and scene is None:
+        lines = [*lines, command.write(record, out)]
+    if not _json(record, json_file):
+        print("\n".join(lines))
+
+
+@app.command
+def export(
+    energy: str,
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="Folder for the files.")],
+    count: Annotated[int, Parameter(help="States of each hard case.")] = 8,
+    extreme: Annotated[
+        bool, Parameter(negative="", help="Sizes from 1e-200 to 1e200 too, which no cloth has.")
+    ] = False,
+    derivations: Annotated[Path | None, Parameter(help="Folder of declared energies.")] = None,
+) -> None:
+    """Golden vectors, corrected formulas and C source, for those who do not use Python.
+
+    Parameters
+    ----------
+    energy
+        Name of a declared energy, such as bending.
+    """
+    from yarnverify.export.command import export as run
+
+    with progress("exporting") as advance:
+        lines = run(energy, out, derivations, count, extreme, advance)
+    print("\n".join(lines))
 
 
 @app.command

@@ -23,6 +23,7 @@ from yarnverify.symbolic.declare import Energy
 
 Array = NDArray[Any]
 Status = Literal["pass", "not judged", "wrong", "approximate", "loses digits", "no value"]
+_APPROXIMATE = 1e3  # units: what no rounding of a right formula loses where nothing is hard
 _NEAR = 0.1  # rad: a state that is nearer to a special angle than this is near it
 
 
@@ -78,8 +79,9 @@ class Judge:
         if finite.any() and (relative[finite] > 1e-3).any():
             text, found = self._formula(block, finite)
             return Diagnosis("wrong", (text,) if text else (), found)
-        if finite.any() and (fails & finite).sum() * 2 > finite.sum():
-            return Diagnosis("approximate", (self._precision(block, finite, float(np.median(relative[finite]))),))
+        middle = float(np.median(relative[finite])) if finite.any() else 0.0
+        if middle > _APPROXIMATE * UNIT[self.cases.dtype] and (fails & finite).sum() * 2 > finite.sum():
+            return Diagnosis("approximate", (self._precision(block, finite, middle),))
         if not finite.any() and plain.any():
             return Diagnosis("no value", ("is NaN or infinite even where nothing is hard",))
         if broken.any():

@@ -209,14 +209,18 @@ def lines(checked: Checked, groups: list[tuple[list[Block], Diagnosis]]) -> list
     judged = [block for blocks, _ in groups for block in blocks]
     bad = len([block for block in judged if not block.passes])
     if checked.passes:
-        found.append(f"PASS: {len(judged)} blocks; {RULE}.")
+        found.append(f"PASS: {_blocks(judged)}; {RULE}.")
     elif not judged:
         found.append("FAIL: nothing came back.")
     elif not bad:
-        found.append(f"FAIL: {len(judged)} blocks are right where they were judged, but see above.")
+        found.append(f"FAIL: {_blocks(judged)} right where judged, but see above.")
     else:
-        found.append(f"FAIL: {bad} of {len(judged)} blocks; {RULE}.")
+        found.append(f"FAIL: {bad} of {_blocks(judged)}; {RULE}.")
     return found
+
+
+def _blocks(blocks: list[Block]) -> str:
+    return f"{len(blocks)} block{'s' * (len(blocks) != 1)}"
 
 
 def _state_lines(checked: Checked, at: int) -> list[str]:

@@ -12,6 +12,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from yarnverify.report.accuracy import error_table, kinds, worst_state
+from yarnverify.report.analysis import analysis_tables, fabric_line
 from yarnverify.report.benchmark import tables, where
 from yarnverify.report.mathml import compared, formula
 from yarnverify.report.pages import mistakes
@@ -26,6 +27,7 @@ _PARTS = (  # anchor and heading, in reading order
     ("equations", "Every equation"),
     ("accuracy", "Accuracy"),
     ("speed", "Speed"),
+    ("analysis", "Analysis"),
     ("commands", "How to get these numbers again"),
 )
 
@@ -42,7 +44,7 @@ def page(records: dict[str, Any], pictures: Mapping[str, str], name: str = "") -
     name
         What the command line calls the folder that it is about; empty for the one that comes with the package.
     """
-    found, derived = records["verdicts"], records["derivations"]
+    found, derived, analysis = records["verdicts"], records["derivations"], records.get("analysis")
     templates = Environment(
         loader=FileSystemLoader(_FOLDER / "templates" / "page"),
         undefined=StrictUndefined,
@@ -63,6 +65,9 @@ def page(records: dict[str, Any], pictures: Mapping[str, str], name: str = "") -
         sections=_sections(found),
         mistakes=[{**claim, "marked": _marked(claim)} for claim in mistakes(found, None)],
         accuracy=records.get("accuracy"),
+        analysis=analysis,
+        analysed=analysis_tables(analysis) if analysis else [],
+        fabric=fabric_line(analysis) if analysis else "",
         benchmark=records.get("benchmark"),
         errors={name: _errors(records.get("accuracy"), name) for name in derived},
         hardest={name: _hardest(records.get("accuracy"), name) for name in derived},
@@ -72,8 +77,8 @@ def page(records: dict[str, Any], pictures: Mapping[str, str], name: str = "") -
 
 
 def _powers(text: str) -> Markup:
-    """Powers such as 2^-53 in raised figures."""
-    return Markup(re.sub(r"(?<=\d)\^(-?\d+)", lambda m: f"<sup>{m[1].replace('-', '−')}</sup>", str(escape(text))))
+    """Powers such as 2^-53 and N m^2 in raised figures."""
+    return Markup(re.sub(r"(?<=[\w)])\^(-?\d+)", lambda m: f"<sup>{m[1].replace('-', '−')}</sup>", str(escape(text))))
 
 
 def _worst(verdicts: list[str]) -> str:
@@ -125,10 +130,17 @@ def _speeds(record: dict[str, Any] | None, energy: str) -> list[Any]:
     return tables(record, energy) if record is not None and energy in record["energies"] else []
 
 
+_ALT = {
+    "error": "Error of every variant of {} as its hard states are approached; the table below has the worst.",
+    "speed": "Nanoseconds per element against worst error, for every way to compute {}; the tables below have both.",
+    "analysis-stability": "Lowest over largest eigenvalue of each energy's Hessian over angle and stretch: stretch is "
+    "indefinite where it is compressed, bending wherever it is bent, shear off the right angle, contact never.",
+    "analysis-modes": "Heights of the first four modes of a net, and errors of frequencies over the number of segments.",
+    "analysis-moduli": "Modulus of a strip over the direction of the pull: greatest along the yarns, least along the bias.",
+}
+
+
 def _drawn(text: str, name: str) -> Markup:
     energy, _, what = name.rpartition("-")
-    alt = {
-        "error": f"Error of every variant of {energy} as its hard states are approached; the table below has the worst.",
-        "speed": f"Nanoseconds per element against worst error, for every way to compute {energy}; the tables below have both.",
-    }.get(what, name.replace("-", " "))
+    alt = _ALT.get(name) or _ALT.get(what, name.replace("-", " ")).format(energy)
     return Markup(inline(text, name, alt))

@@ -9,6 +9,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from yarnverify.report.accuracy import accuracy_table, kinds
+from yarnverify.report.analysis import analysis_tables, fabric_line
 from yarnverify.report.benchmark import benchmark_table
 
 _TEMPLATES = Environment(
@@ -29,7 +30,7 @@ def pages(
     ----------
     records
         ``verdicts``, ``derivations`` and ``kernels``, as written to ``records/``;
-        ``accuracy`` and ``benchmark`` where measured.
+        ``accuracy``, ``benchmark`` and ``analysis`` where measured.
     pictures
         Names of the pictures that are in ``pictures/``.
     source
@@ -47,6 +48,7 @@ def pages(
             rows=_rows(found, ""),
             mistakes=mistakes(found, None),
             place=place,
+            analysed=records.get("analysis") is not None,
         )
     }
     for energy, derivation in derived.items():
@@ -65,6 +67,15 @@ def pages(
             benchmark=_benchmark(records.get("benchmark"), energy),
             pictures=pictures,
             place=place,
+        )
+    analysis = records.get("analysis")
+    if analysis is not None:
+        texts["analysis.md"] = _render(
+            "analysis.md.jinja",
+            tables=analysis_tables(analysis),
+            fabric=fabric_line(analysis),
+            command=analysis["command"],
+            pictures=pictures,
         )
     return dict(sorted(texts.items()))
 

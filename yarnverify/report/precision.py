@@ -67,7 +67,7 @@ def _dress(axes: Axes, result: Mapping[str, Any], answer: str, k: int) -> None:
     axes.set_yscale("log")
     axes.margins(x=0.12)
     runs = [run["answers"][k] for line in result["lines"] for run in line["runs"]]
-    known = [answer["within"] for answer in runs if answer["within"] is not None]
+    known = [answer["allowed"] for answer in runs if answer["allowed"] is not None]
     if known:
         axes.axhline(max(known), color="0.4", linewidth=0.7, linestyle=(0, (1, 3)))
         axes.annotate("allowed", (1, max(known)), xycoords=("axes fraction", "data"), xytext=(-2, 2),

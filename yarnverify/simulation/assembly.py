@@ -20,11 +20,10 @@ from scipy import sparse
 
 from yarnverify.kernels import ElementError
 from yarnverify.kernels.batch import Batch
-from yarnverify.kernels.inputs import check_options
-from yarnverify.simulation import scatter
 from yarnverify.simulation.owners import owners
 from yarnverify.simulation.pattern import Elements, Pattern, zeros
 from yarnverify.simulation.problem import Evaluation, Worst
+from yarnverify.simulation.scatter import Arrays, Loops, Scatter, engine_for
 from yarnverify.simulation.semidefinite import ALONE, Form, eigenvalues, form_of
 from yarnverify.simulation.terms import Term
 
@@ -50,7 +49,7 @@ class System:
     others
         Tables that share the matrix but are summed elsewhere: the kinetic energy.
     engine
-        ``numpy`` or ``compiled``, with the same bits.
+        ``numpy`` or ``compiled``, with the same bits; ``auto`` for the faster one of those that are there.
     definite
         ``quick`` for the forms of ``semidefinite``, ``eigenvalues`` for the exact projection of every element.
 
@@ -68,7 +67,7 @@ class System:
         loads: ArrayLike | None = None,
         *,
         others: Sequence[Elements] = (),
-        engine: Literal["numpy", "compiled"] = "numpy",
+        engine: Literal["auto", "numpy", "compiled"] = "auto",
         definite: Literal["quick", "eigenvalues"] = "quick",
     ) -> None:
         self.size = np.size(Q)
@@ -76,7 +75,7 @@ class System:
         self.active = _indices(active, self.size)
         if definite not in ("quick", "eigenvalues"):
             raise ValueError(f"definite must be 'quick' or 'eigenvalues', not {definite!r}")
-        check_options("raise", 1, engine)
+        self.engine = engine_for(engine, sum(term.table.count for term in self.terms))
         self.loads = np.zeros(self.size) if loads is None else np.array(loads, float)
         if self.loads.shape != (self.size,):
             raise ValueError(f"loads must have shape ({self.size},), not {self.loads.shape}")
@@ -88,8 +87,7 @@ class System:
                 raise ValueError(f"{term.name}: an element reads beyond the configuration")
         tables = [Elements(t.table.rows, t.kernel.DOFS, zeros(t.kernel.KERNEL)) for t in self.terms]
         self.pattern = Pattern(self.size, self.active, [*tables, *others])
-        self.engine = engine
-        self._add = scatter.compiled() if engine == "compiled" else scatter.add
+        self.scatter: Scatter = Loops() if self.engine == "compiled" else Arrays()
         self._forms: list[Form] = [form_of(t.kernel) if definite == "quick" else eigenvalues for t in self.terms]
         self._memory: dict[tuple[int, int], list[Array]] = {}
         self.seconds = {"kernels": 0.0, "assembly": 0.0}
@@ -127,7 +125,7 @@ class System:
         total = np.zeros(self.size)
         for term, _, part, q in self._chunks(Q):
             g = self._run(term, "G", q, part)[0]
-            self._add(total, term.table.rows[:, part], g, np.arange(len(g)))
+            self.scatter.entries(total, term.table.rows[:, part], g)
         return total - self.loads
 
     def gradient(self, Q: Array) -> Array:
@@ -141,7 +139,7 @@ class System:
     def evaluate(self, Q: Array, definite: bool = False) -> Evaluation:
         """All at once."""
         total, force = self._work(Q), float(np.abs(self.loads).max(initial=0.0))
-        slope, sums = np.zeros(self.size), np.zeros(self.pattern.sums + 1)
+        slope, sums = np.zeros(self.size), self.pattern.zero()
         for term, number, part, q in self._chunks(Q):
             places = self.pattern.places[number]
             if not places.pairs.size:
@@ -158,9 +156,9 @@ class System:
             start = perf_counter()
             total += float(np.add.reduce(e))
             force = max(force, float(g.max(initial=0.0)), -float(g.min(initial=0.0)))
-            self._add(slope, term.table.rows[:, part], g, np.arange(len(g)))
+            self.scatter.entries(slope, term.table.rows[:, part], g)
             if packed is not None:
-                self._add(sums, places.at[:, part], packed, places.pairs)
+                self.scatter.blocks(sums, places, part, packed, places.pairs)
             self.seconds["assembly"] += perf_counter() - start
         start = perf_counter()
         matrix = self.pattern.matrix(sums)

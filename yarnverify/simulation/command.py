@@ -66,7 +66,7 @@ def _line(error: BaseException, path: Path) -> int:
     """The last line of a file on the way to an error."""
     line, trace = 1, error.__traceback__
     while trace is not None:
-        if trace.tb_frame.f_code.co_filename == str(path):
+        if Path(trace.tb_frame.f_code.co_filename).resolve() == path.resolve():
             line = trace.tb_lineno
         trace = trace.tb_next
     return line

@@ -117,7 +117,7 @@ class Dynamics:
         scheme: Scheme = "midpoint",
         solver: Solver | None = None,
         held: Callable[[float, Array], None] | None = None,
-        engine: Literal["numpy", "compiled"] = "numpy",
+        engine: Literal["auto", "numpy", "compiled"] = "auto",
         **options: Any,
     ) -> None:
         if scheme not in ORDERS:

@@ -78,7 +78,7 @@ class Increment:
         energy, gradient, matrix, force = self.inertia.system.evaluate(self.at(Q), definite)
         work, slope = self._inertial(Q)
         matrix.data *= self.a * self.a
-        matrix.data += self.inertia.active_mass.data / self.tau**2
+        self.inertia.add_mass(matrix, 1 / self.tau**2)
         size = float(np.abs(self.momentum[self.active]).max(initial=0.0)) / self.tau
         return Evaluation(energy + work, self.a * gradient + slope[self.active], matrix, max(self.a * force, size))
 

@@ -71,12 +71,11 @@ class Inertia:
     def kinetic(self, Q: Array, V: Array) -> Kinetic:
         """Energy, momenta and slope for coordinates and velocities (size,) each."""
         energy, momentum, slope = 0.0, np.zeros(self.system.size), np.zeros(self.system.size)
-        every = np.arange(self.half)
         for part, rows, q in self._parts(Q, V):
             e, g = self._run("EG", q, part)
             energy += float(np.add.reduce(e))
-            self.system._add(slope, rows, g[: self.half], every)
-            self.system._add(momentum, rows, g[self.half :], every)
+            self.system.scatter.entries(slope, rows, g[: self.half])
+            self.system.scatter.entries(momentum, rows, g[self.half :])
         return Kinetic(energy, momentum, slope)
 
     def jacobian(self, Q: Array, V: Array, rate: float, weight: float, share: float) -> tuple[Any, Any]:
@@ -88,16 +87,15 @@ class Inertia:
         vv = np.array([number[half + i, half + j] for i, j in pairs], int)
         vq = np.array([number[j, half + i] for i, j in pairs], int)
         qv = np.array([number[i, half + j] for i, j in pairs], int)
-        even, odd = np.zeros(pattern.sums + 1), np.zeros(pattern.sums + 1)
+        even, odd = pattern.zero(), pattern.zero()
         every = np.arange(len(pairs))
-        for part, rows, q in self._parts(Q, V):
+        for part, _, q in self._parts(Q, V):
             (packed,) = self._run("H", q, part)
-            at = self._places.at[:, part]
-            self.system._add(even, at, rate * packed[vv] - share * packed[qq], every)
+            self.system.scatter.blocks(even, self._places, part, rate * packed[vv] - share * packed[qq], every)
             # a pair stands for the entry (i, j) of the element, which may lie below the diagonal of the system
-            local = pattern.local[rows]
-            turn = np.where(local[[i for i, _ in pairs]] > local[[j for _, j in pairs]], -weight, weight)
-            self.system._add(odd, at, turn * (packed[vq] - packed[qv]), every)
+            values = weight * (packed[vq] - packed[qv])
+            self._places.turn(values, part)
+            self.system.scatter.blocks(odd, self._places, part, values, every)
         return pattern.matrix(even), pattern.skew(odd)
 
     @cached_property
@@ -109,12 +107,13 @@ class Inertia:
         none = zeros(self.term.kernel.KERNEL)
         pairs = [(i, j, number[half + min(i, j), half + max(i, j)]) for i in axes for j in axes]
         pairs = [pair for pair in pairs if pair[2] not in none]
-        found = []
+        total = sparse.csr_array((size, size))
         for part, rows, q in self._parts(self._rest, np.zeros(size)):
             (packed,) = self._run("H", q, part)
-            found += [(packed[k], rows[i], rows[j]) for i, j, k in pairs]
-        data, row, column = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        return sparse.coo_array((data, (row, column)), shape=(size, size)).tocsr()
+            data, row, column = (np.concatenate(parts) for parts in zip(
+                *((packed[k], rows[i], rows[j]) for i, j, k in pairs), strict=True))  # fmt: skip
+            total = total + sparse.coo_array((data, (row, column)), shape=(size, size)).tocsr()
+        return total
 
     def bind(self, Q: Array, *others: Array) -> bool:
         """Whether the mass matrix is constant: no sliding coordinate is unknown, or differs between configurations.
@@ -128,17 +127,31 @@ class Inertia:
         if key != self._key:
             self._key, self._rest = key, Q.copy()
             self.__dict__.pop("mass", None)
-            self.__dict__.pop("active_mass", None)
+            self.__dict__.pop("_active_mass", None)
         return True
 
-    @cached_property
+    @property
     def active_mass(self) -> sparse.csc_array:
         """The constant mass matrix of the unknowns, in the pattern of the system."""
+        found = self.system.pattern.matrix(self.system.pattern.zero())
+        self.add_mass(found, 1.0)
+        return found
+
+    def add_mass(self, matrix: sparse.csc_array, factor: float) -> None:
+        """Add the constant mass matrix to one of the system's pattern, in place."""
+        at, values = self._active_mass
+        matrix.data[at] += factor * values
+
+    @cached_property
+    def _active_mass(self) -> tuple[Array, Array]:
+        """Places and values of the entries that are not zero."""
         number = {pair: k for k, pair in enumerate(upper(2 * self.half))}
         pairs = [upper(self.half)[k] for k in self._places.pairs]
         vv = np.array([number[self.half + i, self.half + j] for i, j in pairs], int)
-        sums = np.zeros(self.system.pattern.sums + 1)
+        sums = self.system.pattern.zero()
         for part, _, q in self._parts(self._rest, np.zeros(self.system.size)):
             (packed,) = self._run("H", q, part)
-            self.system._add(sums, self._places.at[:, part], packed[vv], np.arange(len(pairs)))
-        return self.system.pattern.matrix(sums)
+            self.system.scatter.blocks(sums, self._places, part, packed[vv], np.arange(len(pairs)))
+        data = self.system.pattern.matrix(sums).data
+        at = np.flatnonzero(data).astype(self.system.pattern.indptr.dtype)
+        return at, data[at]

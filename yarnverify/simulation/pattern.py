@@ -1,14 +1,13 @@
 """Where the entries of element Hessians stand in a sparse symmetric matrix: worked out once, for any number of evaluations.
 
-Unknowns that always occur together (the coordinates of a node) are a block; the pattern is found on blocks, which are
-fewer, and then spread out. Only the upper triangle is summed; the full matrix is read from it.
+Elements are summed into the upper triangle by blocks, one place for each pair of blocks of an element; the matrix of the
+unknowns is read from these sums.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,34 +15,46 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from yarnverify.kernels.batch import upper
-from yarnverify.kernels.runtime import Kernel
-from yarnverify.kernels.tape import Trace, Traced
+from yarnverify.simulation.blocks import Blocks, Elements, groups, zeros
+
+__all__ = ["Elements", "Pair", "Pattern", "Places", "zeros"]
 
 Array = NDArray[Any]
+ROWS = 16384  # blocks whose rows are made at a time, so that memory on the way stays small
 
 
-class Elements(NamedTuple):
-    """A table as the pattern sees it: rows (dofs, n), names of the dofs, and entries of the packed Hessian that are zero."""
+class Pair(NamedTuple):
+    """A pair of blocks of an element, and the entries of its Hessian that are summed there.
 
-    rows: Array
-    labels: Sequence[str]
-    zeros: frozenset[int] = frozenset()
+    Attributes
+    ----------
+    base
+        Where the block stands in the sums, (n,); the end of the sums for what belongs nowhere.
+    turned
+        Whether the block stands there transposed, (n,) of 0 and 1, or empty where it never does.
+    which, straight, transposed
+        Which of ``Places.pairs`` they are, and their places in the block as it is and transposed, (k,) each.
+    """
+
+    base: Array
+    turned: Array
+    which: Array
+    straight: Array
+    transposed: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Where the Hessian of one table goes.
-
-    Attributes
-    ----------
-    pairs
-        Which rows of the packed upper triangle have both unknowns active somewhere, (k,).
-    at
-        Their places in the sums, (k, n) int32; the last place is for what belongs nowhere.
-    """
+    """Where the Hessian of one table goes: sorted rows of the packed Hessian that matter, (k,), and their pairs of blocks."""
 
     pairs: Array
-    at: Array
+    blocks: tuple[Pair, ...]
+
+    def turn(self, values: Array, part: slice) -> None:
+        """Change the sign of entries (k, m) of a skew matrix where their block is summed transposed."""
+        for pair in self.blocks:
+            if pair.turned.size:
+                values[pair.which] *= 1 - 2 * pair.turned[part]
 
 
 class Pattern:
@@ -63,106 +74,105 @@ class Pattern:
         self.count = len(active)
         self.local = np.full(size, -1, np.int32)  # place of each entry of the configuration among the unknowns
         self.local[active] = np.arange(self.count, dtype=np.int32)
-        block = _blocks(size, active, tables)
-        self._block: Array = np.full(size, -1, np.int32)
-        of_unknown = block[active]
-        starts = np.flatnonzero(np.diff(of_unknown, prepend=-1))
-        self._first = starts.astype(np.int32)  # first unknown of each block
-        self._width = np.diff(starts, append=self.count).astype(np.int32)
-        number = np.repeat(np.arange(len(starts), dtype=np.int32), self._width)
-        self._block[active] = number
-        self._graph(tables)
-        self._spread(number)
-        self.places = [self._places(table) for table in tables]
-        del self._keys, self._offset, self._row_pointer, self._widths, self._upper, self._diagonal
+        self._blocks = Blocks.made(size, active, tables)
+        wanted = [_wanted(self.local, table) for table in tables]
+        keys = self._keys(tables, wanted)
+        row, column = keys // max(self._blocks.count, 1), keys % max(self._blocks.count, 1)
+        area = self._blocks.height[row].astype(np.int64) * self._blocks.height[column]
+        start = np.concatenate([[0], np.cumsum(area)])
+        self.sums = int(start[-1])
+        self._kind: Any = np.int32 if self.sums + 9 < 2**31 else np.int64
+        start = start[:-1].astype(self._kind)
+        self.places = [self._places(t, w, keys, start) for t, w in zip(tables, wanted, strict=True)]
+        self._spread(active, row.astype(np.int32), column.astype(np.int32), start)
 
-    def _graph(self, tables: Sequence[Elements]) -> None:
-        """Which blocks share an element."""
-        blocks = len(self._first)
-        found: sparse.csr_array = sparse.eye_array(blocks, dtype=bool, format="csr")
-        for rows, labels, _ in tables:
-            heads = [self._heads(rows, group) for group in groups(labels)]
-            used = [head for head in heads if (head >= 0).any()]
-            if not used or not rows.shape[1]:
-                continue
-            columns = np.stack(used, axis=1)
-            mask = columns >= 0
-            pointer = np.concatenate([[0], np.cumsum(mask.sum(1))]).astype(np.int32)
-            data = np.ones(pointer[-1], bool)
-            incidence = sparse.csr_array((data, columns[mask], pointer), shape=(rows.shape[1], blocks))
-            found = found + (incidence.T.tocsr() @ incidence)
-        found.sort_indices()
-        self.graph = found  # blocks that are coupled
-        row = np.repeat(np.arange(blocks, dtype=np.int64), np.diff(found.indptr))
-        self._keys = row * blocks + found.indices
-        widths = self._width[found.indices].astype(np.int64)
-        total = np.concatenate([[0], np.cumsum(widths)])
-        self._offset = (total[:-1] - np.repeat(total[found.indptr[:-1]], np.diff(found.indptr))).astype(np.int32)
-        self._row_pointer, self._widths = total[found.indptr], widths
+    def zero(self) -> Array:
+        """Sums to begin with."""
+        return np.zeros(self.sums + 9)  # what belongs nowhere goes to the last nine
 
-    def _spread(self, number: Array) -> None:
-        """From blocks to unknowns, full matrix and upper triangle."""
-        total = int(self._widths.sum())
-        inside = np.arange(total, dtype=np.int32) - np.repeat(
-            np.cumsum(self._widths) - self._widths, self._widths
-        ).astype(np.int32)
-        columns = np.repeat(self._first[self.graph.indices], self._widths) + inside
-        length = np.diff(self._row_pointer)[number]
-        pointer = np.concatenate([[0], np.cumsum(length)])
+    # -- how it is found
+
+    def _heads(self, table: Elements) -> list[Array]:
+        """The block of each element's groups of rows, -1 where none of it is unknown; (n,) each."""
+        return [self._blocks.of[table.rows[group[0]]] for group in groups(table.labels)]
+
+    def _keys(self, tables: Sequence[Elements], wanted: Sequence[_Wanted]) -> Array:
+        """Sorted numbers ``row * blocks + column`` of the blocks of the upper triangle that are not empty."""
+        blocks = self._blocks.count
+        found = np.arange(blocks, dtype=np.int64) * (blocks + 1)
+        for table, pairs in zip(tables, wanted, strict=True):
+            heads = self._heads(table)
+            found = np.unique(np.concatenate([found, *(_key(heads[a], heads[b], blocks) for a, b in pairs if a != b)]))
+        return found[np.searchsorted(found, 0) :]  # without the -1 of what is not unknown
+
+    def _places(self, table: Elements, wanted: _Wanted, keys: Array, start: Array) -> Places:
+        heads, made = self._heads(table), []
+        needed = np.sort(np.array([k for entries in wanted.values() for k, _, _ in entries], np.int64))
+        for (a, b), entries in wanted.items():
+            key = _key(heads[a], heads[b], self._blocks.count)
+            base = np.full(key.size, self.sums, self._kind)
+            there = key >= 0
+            base[there] = start[np.searchsorted(keys, key[there])]
+            turned = ((heads[a] > heads[b]) & there).astype(np.int8)
+            first, second = (len(groups(table.labels)[k]) for k in (a, b))
+            k, i, j = np.array(entries, np.int64).T
+            which = np.searchsorted(needed, k)
+            made.append(Pair(base, turned if turned.any() else turned[:0], which, i * second + j, j * first + i))
+        return Places(needed, tuple(made))
+
+    def _spread(self, active: Array, row: Array, column: Array, start: Array) -> None:
+        """Rows of the matrix in its unknowns, and where in the sums its entries come from."""
+        blocks, off = self._blocks, row != column
+        above = sparse.csr_array((start, (row, column)), shape=(blocks.count,) * 2)
+        below = sparse.csr_array((start[off], (column[off], row[off])), shape=above.shape)
+        width = np.diff(blocks.pointer)
+        length = np.zeros(blocks.count, np.int64)
+        np.add.at(length, row, width[column])
+        np.add.at(length, column[off], width[row[off]])
+        number = np.repeat(np.arange(blocks.count, dtype=np.int32), width)
+        pointer = np.concatenate([[0], np.cumsum(length[number])])
         kind: Any = np.int32 if pointer[-1] < 2**31 else np.int64
         self.indptr = pointer.astype(kind)
-        shift = (self._row_pointer[number] - pointer[:-1]).astype(kind)
-        self.indices = columns[np.repeat(shift, length) + np.arange(pointer[-1], dtype=kind)].astype(np.int32)
-        rows = np.repeat(np.arange(self.count, dtype=np.int32), length)
-        above: NDArray[np.bool_] = self.indices >= rows
-        del rows
-        number_above = np.add.reduceat(above, self.indptr[:-1], dtype=kind) if self.count else np.empty(0, kind)
-        self._upper = np.concatenate([[0], np.cumsum(number_above)]).astype(kind)
-        self.sums = int(self._upper[-1])
-        self._diagonal = (self.indptr[1:] - number_above).astype(kind)  # where the diagonal stands in each row
-        source: NDArray[np.integer[Any]] = np.empty(int(pointer[-1]), kind)
-        source[above] = np.arange(self.sums, dtype=kind)
-        shape = (self.count, self.count)
-        other = sparse.csr_array((np.arange(pointer[-1], dtype=kind), self.indices, self.indptr), shape=shape).T.tocsr()
-        below = ~above
-        source[below] = source[other.data[below]]
-        self._source = source
+        self.indices = np.empty(int(pointer[-1]), np.int32)
+        self._source = np.empty(int(pointer[-1]), self._kind)
+        inner = blocks.inner[active].astype(self._kind)
+        for part in range(0, blocks.count, ROWS):
+            rows = slice(part, min(part + ROWS, blocks.count))
+            self._rows(rows, below[rows], above[rows], inner)
 
-    def _heads(self, rows: Array, group: Sequence[int]) -> Array:
-        """The block of each element's group of rows, -1 where none of it is active; (n,)."""
-        found = self._block[rows[group[0]]]
-        for k in group[1:]:
-            found = np.maximum(found, self._block[rows[k]])
-        return found
+    def _rows(self, rows: slice, below: Any, above: Any, inner: Array) -> None:
+        """Some block rows: entries left of the diagonal, then the others, each block spread over its unknowns."""
+        blocks = self._blocks
+        mine = np.concatenate([np.repeat(np.arange(m.shape[0]), np.diff(m.indptr)) for m in (below, above)])
+        lower = np.arange(mine.size) < below.nnz
+        other = np.concatenate([below.indices, above.indices])
+        start = np.concatenate([below.data, above.data])
+        order = np.lexsort((other, mine))
+        mine, lower, other, start = mine[order], lower[order], other[order], start[order]
+        # columns: all unknowns of the other block
+        width = np.diff(blocks.pointer)[other]
+        entry = np.repeat(np.arange(mine.size), width)
+        unknown = blocks.pointer[other][entry] + _counting(width)
+        step = np.where(lower, 1, blocks.height[other])[entry]  # from one row of the block to the next
+        base = start[entry] + inner[unknown] * np.where(lower, blocks.height[rows.start + mine], 1)[entry]
+        diagonal = (rows.start + mine == other)[entry]
+        # rows: all unknowns of the block itself
+        size = np.bincount(mine, width, minlength=rows.stop - rows.start).astype(np.int64)
+        first, last = int(blocks.pointer[rows.start]), int(blocks.pointer[rows.stop])
+        of = np.repeat(np.arange(rows.stop - rows.start), np.diff(blocks.pointer[rows.start : rows.stop + 1]))
+        line = np.repeat(np.arange(last - first), size[of])
+        at = (np.cumsum(size) - size)[of][line] + _counting(size[of])
+        r, c = inner[first:last][line], inner[unknown[at]]
+        place = base[at] + r * step[at]
+        swapped = diagonal[at] & (r > c)  # only the upper triangle of a diagonal block is summed
+        place[swapped] += ((c - r) * (step[at] - 1))[swapped]
+        here = slice(int(self.indptr[first]), int(self.indptr[last]))
+        self.indices[here], self._source[here] = unknown[at], place
 
-    def _places(self, table: Elements) -> Places:
-        rows, labels, nothing = table
-        local = [self.local[row] for row in rows]
-        some = [bool((row >= 0).any()) for row in local]
-        pairs = [k for k, (i, j) in enumerate(upper(len(labels))) if some[i] and some[j] and k not in nothing]
-        at = np.empty((len(pairs), rows.shape[1]), np.int32 if self.sums < 2**31 else np.int64)
-        number = {pair: k for k, pair in enumerate(upper(len(labels)))}
-        target = {k: m for m, k in enumerate(pairs)}
-        parts = groups(labels)
-        heads = [self._heads(rows, group) for group in parts]
-        blocks = len(self._first)
-        for a, first in enumerate(parts):
-            for b, second in enumerate(parts[a:], a):
-                wanted = [(i, j) for i in first for j in second if i <= j and number[i, j] in target]
-                if not wanted:
-                    continue
-                low, high = np.minimum(heads[a], heads[b]), np.maximum(heads[a], heads[b])
-                there = low >= 0
-                key = np.where(there, low.astype(np.int64) * blocks + high, self._keys[0])
-                shift = self._offset[np.searchsorted(self._keys, key)] - self._first[high]
-                for i, j in wanted:
-                    row, column = np.minimum(local[i], local[j]), np.maximum(local[i], local[j])
-                    place = self.indptr[row] + shift + column - self._diagonal[row] + self._upper[row]
-                    at[target[number[i, j]]] = np.where(row >= 0, place, self.sums)
-        return Places(np.array(pairs, np.int64), at)
+    # -- what it gives
 
     def matrix(self, sums: Array) -> sparse.csc_array:
-        """The full symmetric matrix of summed upper entries (sums + 1,)."""
+        """The full symmetric matrix of sums (sums + 9,)."""
         shape = (self.count, self.count)
         found = sparse.csc_array((sums.take(self._source), self.indices, self.indptr), shape=shape)
         found.has_sorted_indices = True
@@ -175,41 +185,37 @@ class Pattern:
         data = sums.take(self._source) * np.sign(self.indices - row)
         return sparse.csr_array((data, self.indices, self.indptr), shape=(self.count, self.count))
 
-    @cached_property
+    @property
     def bytes(self) -> int:
         """Memory that it takes."""
-        held = [self.local, self._block, self.indptr, self.indices, self._source, *(p.at for p in self.places)]
-        return sum(a.nbytes for a in held)
+        held = [self.local, self._blocks.of, self._blocks.inner, self.indptr, self.indices, self._source]
+        pairs = [pair for places in self.places for pair in places.blocks]
+        return sum(a.nbytes for a in held) + sum(pair.base.nbytes + pair.turned.nbytes for pair in pairs)
 
 
-def zeros(kernel: Kernel) -> frozenset[int]:
-    """Entries of the packed Hessian that are zero whatever the element, found by following the kernel's formulas."""
-    count = len(kernel.dofs) * (len(kernel.dofs) + 1) // 2
-    found = set(range(count))
-    for shape in range(len(kernel.shapes)):
-        trace = Trace(np.dtype(float))
-        inputs = [Traced(trace, trace.node("input", i)) for i in range(len(kernel.dofs) + len(kernel.parameters))]
-        values = kernel.outputs(shape, "H")(inputs)[:count]
-        found &= {k for k, value in enumerate(values) if trace.nodes[trace.lift(value).number] == ("constant", 0.0)}
-    return frozenset(found)
+_Wanted = dict[tuple[int, int], list[tuple[int, int, int]]]
 
 
-def groups(labels: Sequence[str]) -> list[list[int]]:
-    """Rows that belong together: the axes of a point, or a coordinate alone."""
-    found: dict[str, list[int]] = {}
-    for k, label in enumerate(labels):
-        found.setdefault(label.partition(".")[0], []).append(k)
-    return list(found.values())
+def _wanted(local: Array, table: Elements) -> _Wanted:
+    """For each pair of groups of rows: rows of the packed Hessian that can matter, and their places in either group."""
+    rows, labels, nothing = table
+    some = [bool((local[row] >= 0).any()) for row in rows]
+    parts = groups(labels)
+    place = {k: (a, i) for a, group in enumerate(parts) for i, k in enumerate(group)}
+    found: _Wanted = {}
+    for k, (i, j) in enumerate(upper(len(labels))):
+        if some[i] and some[j] and k not in nothing:
+            (a, first), (b, second) = place[i], place[j]
+            found.setdefault((a, b), []).append((k, first, second))
+    return found
 
 
-def _blocks(size: int, active: Array, tables: Sequence[Elements]) -> Array:
-    """The first entry of the block of each entry of the configuration, (size,)."""
-    block = np.arange(size, dtype=np.int32)
-    for rows, labels, _ in tables:
-        for group in groups(labels):
-            head = rows[group[0]]
-            for k in group[1:]:
-                if not (rows[k] == head + k - group[0]).all():
-                    raise ValueError(f"the rows of {labels[group[0]]} and {labels[k]} do not follow each other")
-                block[rows[k]] = head
-    return block
+def _key(first: Array, second: Array, blocks: int) -> Array:
+    """The number of a pair of blocks in the upper triangle, -1 where one of them is missing."""
+    low, high = np.minimum(first, second).astype(np.int64), np.maximum(first, second)
+    return np.where(low >= 0, low * blocks + high, -1)
+
+
+def _counting(lengths: Array) -> Array:
+    """0 to length - 1 for each length, one after the other."""
+    return np.arange(int(lengths.sum())) - np.repeat(np.cumsum(lengths) - lengths, lengths)

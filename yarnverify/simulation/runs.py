@@ -123,7 +123,7 @@ class Run:
         done, iterations = (int(state["stage"]), int(state["iterations"])) if state else (0, 0)
         Q = np.array(state["Q"], float) if state else self.start
         before = np.array(state["Q before"], float) if state else self.start
-        records = _Records(self._names, state)
+        rows = self._rows(state)
         solver = self._linear(None)
         options = {"residual": RESIDUAL, **p.options}
         for stage in p.stages[:done]:  # loads that a stage leaves are those of the one before
@@ -135,9 +135,11 @@ class Run:
                 self.system, guess, [stage.loads], [stage.held], solver, report=self._tell(number), **options
             ):
                 before, Q, iterations = Q, found.Q, iterations + found.iterations
-            records.add(self._watched(number + 1.0, Q, None))
-            own = {"Q": Q, "Q before": before, "stage": number + 1, "iterations": iterations}
-            yield Reached(number + 1.0, Q, partial(_together, own, records))
+            rows.append(self._watched(number + 1.0, Q, None))
+            own: Callable[[], State] = partial(
+                dict, {"Q": Q, "Q before": before, "stage": number + 1, "iterations": iterations}
+            )
+            yield Reached(number + 1.0, Q, partial(self._saved, rows, len(rows), own))
 
     def _tell(self, number: int) -> Callable[[Any], None] | None:
         if self.report is None:
@@ -154,37 +156,28 @@ class Run:
         else:
             motion = dynamics.start(self.start, p.V)
             frames, times = [motion.Q], [0.0]
-        records = _Records(self._names, state)
-        if not state:
-            records.add(self._watched(0.0, motion.Q, motion))
+        rows = self._rows(state) or [self._watched(0.0, motion.Q, motion)]
         for after in dynamics.run(motion, p.until, p.h, p.tolerance):
             frame = int(after.time / p.until * p.frames + 1e-9) > int(motion.time / p.until * p.frames + 1e-9)
             if frame:
-                frames.append(after.Q)
-                times.append(after.time)
+                frames, times = [*frames, after.Q], [*times, after.time]
             motion = after
-            records.add(self._watched(motion.time, motion.Q, motion))
-            yield Reached(motion.time, motion.Q, partial(_moving, motion, records, frames, times), frame)
+            rows.append(self._watched(motion.time, motion.Q, motion))
+            own = partial(_of_motion, motion, frames, times)
+            yield Reached(motion.time, motion.Q, partial(self._saved, rows, len(rows), own), frame)
+
+    def _rows(self, state: State | None) -> list[list[float]]:
+        """What was watched up to a state, a row a step."""
+        if state is None:
+            return []
+        return np.stack([np.asarray(state[f"recorded {name}"], float) for name in self._names], axis=1).tolist()
+
+    def _saved(self, rows: list[list[float]], count: int, own: Callable[[], State]) -> dict[str, Any]:
+        """What is saved: of rows that go on growing, those of a state."""
+        columns = np.array(rows[:count]).reshape(count, len(self._names)).T
+        return {**own(), **{f"recorded {name}": column for name, column in zip(self._names, columns, strict=True)}}
 
 
-class _Records:
-    """What is watched, growing."""
-
-    def __init__(self, names: list[str], state: State | None) -> None:
-        self.values = {name: list(np.asarray(state[f"recorded {name}"], float)) if state else [] for name in names}
-
-    def add(self, row: list[float]) -> None:
-        for column, value in zip(self.values.values(), row, strict=True):
-            column.append(value)
-
-    def arrays(self) -> dict[str, Any]:
-        return {f"recorded {name}": np.array(column) for name, column in self.values.items()}
-
-
-def _together(own: State, records: _Records) -> dict[str, Any]:
-    return {**own, **records.arrays()}
-
-
-def _moving(motion: Motion, records: _Records, frames: list[Array], times: list[float]) -> dict[str, Any]:
+def _of_motion(motion: Motion, frames: list[Array], times: list[float]) -> dict[str, Any]:
     own = {"frames": np.array(frames), "frame times": np.array(times), "iterations": motion.steps}
-    return {**motion.arrays(), **own, **records.arrays()}
+    return {**motion.arrays(), **own}

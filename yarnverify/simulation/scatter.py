@@ -3,44 +3,105 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
 from functools import cache
-from typing import Any
+from importlib.util import find_spec
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from yarnverify.errors import NotRunError
+from yarnverify.kernels.inputs import Engine
+from yarnverify.simulation.pattern import Places
 
 Array = NDArray[Any]
-Add = Callable[[Array, Array, Array, Array], None]
+MANY = 20_000  # elements from which compiled loops are worth the seconds that making them can take
 
 
-def add(sums: Array, at: Array, values: Array, rows: Array) -> None:
-    """``sums[at[k, e]] += values[rows[k], e]``, k outermost."""
-    for places, row in zip(at, rows, strict=True):
-        np.add.at(sums, places.astype(np.intp), values[row])  # only this kind of index takes NumPy's fast way
+def engine_for(wanted: str, elements: int) -> Engine:
+    """The engine for a number of elements, ``auto`` decided."""
+    if wanted == "auto":
+        return "compiled" if elements >= MANY and find_spec("numba") is not None else "numpy"
+    if wanted not in ("numpy", "compiled"):
+        raise ValueError(f"engine must be 'auto', 'numpy' or 'compiled', not {wanted!r}")
+    return "numpy" if wanted == "numpy" else "compiled"
 
 
-@cache
-def compiled() -> Add:
-    """The same as a compiled loop.
+class Scatter(Protocol):
+    """Adds the values of some elements to sums."""
+
+    def entries(self, sums: Array, at: Array, values: Array) -> None:
+        """``sums[at[k, e]] += values[k, e]``, k outermost."""
+
+    def blocks(self, sums: Array, places: Places, part: slice, values: Array, rows: Array) -> None:
+        """Rows ``rows`` of values, one for each of ``places.pairs``, to where they go."""
+
+
+class Arrays:
+    """By NumPy."""
+
+    def entries(self, sums: Array, at: Array, values: Array) -> None:
+        """Add entries."""
+        for places, row in zip(at, values, strict=True):
+            np.add.at(sums, places.astype(np.intp), row)  # only this kind of index takes NumPy's fast way
+
+    def blocks(self, sums: Array, places: Places, part: slice, values: Array, rows: Array) -> None:
+        """Add entries of blocks."""
+        for pair in places.blocks:
+            base, turned = pair.base[part].astype(np.intp), pair.turned[part].astype(np.intp)
+            for k, straight, transposed in zip(rows[pair.which], pair.straight, pair.transposed, strict=True):
+                at = base + straight
+                if turned.size and transposed != straight:
+                    at += (transposed - straight) * turned
+                np.add.at(sums, at, values[k])
+
+
+class Loops:
+    """By compiled loops.
 
     Raises
     ------
     NotRunError
         Without numba.
     """
+
+    def __init__(self) -> None:
+        self._entries, self._blocks = _loops()
+
+    def entries(self, sums: Array, at: Array, values: Array) -> None:
+        """Add entries."""
+        self._entries(sums, at, values)
+
+    def blocks(self, sums: Array, places: Places, part: slice, values: Array, rows: Array) -> None:
+        """Add entries of blocks."""
+        for pair in places.blocks:
+            base, turned = pair.base[part], pair.turned[part]
+            self._blocks(sums, base, turned, values, rows[pair.which], pair.straight, pair.transposed)
+
+
+@cache
+def _loops() -> tuple[Any, Any]:
     try:
         njit = importlib.import_module("numba").njit
     except ImportError:
         raise NotRunError("the engine 'compiled' needs numba: pip install 'yarnverify[compiled]'") from None
 
     @njit(cache=True, nogil=True)
-    def loop(sums, at, values, rows):  # type: ignore[no-untyped-def]
+    def entries(sums, at, values):  # type: ignore[no-untyped-def]
         for k in range(at.shape[0]):
-            places, row = at[k], values[rows[k]]
+            places, row = at[k], values[k]
             for e in range(places.size):
                 sums[np.uint64(places[e])] += row[e]
 
-    return loop
+    @njit(cache=True, nogil=True)
+    def blocks(sums, base, turned, values, rows, straight, transposed):  # type: ignore[no-untyped-def]
+        for k in range(rows.size):
+            row = values[rows[k]]
+            if turned.size:
+                for e in range(base.size):
+                    sums[np.uint64(base[e] + (transposed[k] if turned[e] else straight[k]))] += row[e]
+            else:
+                for e in range(base.size):
+                    sums[np.uint64(base[e] + straight[k])] += row[e]
+
+    return entries, blocks

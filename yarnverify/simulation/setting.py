@@ -63,6 +63,9 @@ class Known:
         Relative error that is allowed: at every size for an exact answer, else at the largest size of the scene.
     scale
         What errors are relative to; by default the greatest exact value.
+    floor
+        Relative error that stays however large the size, where the answer is that of a yarn that does not stretch: three times
+        as much is allowed at least, and an order is not judged below thirty times.
     """
 
     name: str
@@ -72,6 +75,7 @@ class Known:
     order: float | None = None
     within: float = 1e-12
     scale: float | None = None
+    floor: float = 0.0
 
     def compared(self, outcome: Outcome) -> tuple[float, float, float]:
         """Found, exact, and relative error, where the error is greatest."""
@@ -189,14 +193,14 @@ Setting = Static | Moving
 
 
 def rounding(condition: float) -> float:
-    """Error that is allowed for an exact answer: 1e-12, or eight units of rounding where these make more of it.
+    """Error that is allowed for an exact answer: 1e-12, or 64 units of rounding where these make more of it.
 
     Parameters
     ----------
     condition
         Relative change of the answer for a relative change of the coordinates, of their extent.
     """
-    return max(1e-12, 8 * float(np.finfo(float).eps) * condition)
+    return max(1e-12, 64 * float(np.finfo(float).eps) * condition)
 
 
 def ramp(loads: Array, stages: int) -> tuple[Stage, ...]:

@@ -23,10 +23,10 @@ def study_lines(result: Mapping[str, Any], timings: Mapping[str, Any]) -> Iterat
         yield f"{line['name']}; energies and elements: {energies}"
         yield from _table(result["size"], line["runs"], [run["seconds"] for run in timed["runs"]])
     yield ""
-    yield from result["failures"]
+    yield from result["missed"]
     answers = sum(len(line["runs"]) * len(line["runs"][0]["answers"]) for line in result["lines"])
     if answers:
-        missed = len(result["failures"])
+        missed = len(result["missed"])
         yield f"{missed} of the goals missed." if missed else "Every error and every order as expected."
 
 

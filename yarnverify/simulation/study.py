@@ -5,7 +5,6 @@ The record is in two parts: ``result``, the same wherever and however often it i
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any
 
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.kernels import ElementError
+from yarnverify.simulation.goals import add_orders, answer, missed
 from yarnverify.simulation.linear import LinearSolveError
 from yarnverify.simulation.runs import Reached, Run
 from yarnverify.simulation.scene import Line, Scene
@@ -21,7 +21,6 @@ from yarnverify.simulation.search import NotConverged
 from yarnverify.simulation.setting import Setting
 from yarnverify.simulation.state import identity, load, save
 
-SLACK = 0.1  # how far an observed order may be from the expected one
 Tell = Callable[[str, float], None]
 
 
@@ -43,9 +42,9 @@ class Study:
     arrays: Mapping[str, Any]
 
     @property
-    def failures(self) -> list[str]:
+    def missed(self) -> list[str]:
         """Goals that were missed, a line each."""
-        return list(self.result["failures"])
+        return list(self.result["missed"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +117,7 @@ def study(
             before += share
             if key == shown:
                 drawn = arrays
-        kept.append({"name": line.name, "solver": line.solver, "runs": _with_orders(runs)})
+        kept.append({"name": line.name, "solver": line.solver, "runs": add_orders(runs)})
         timed.append({"name": line.name, "runs": seconds})
     result = {
         "schema": 1,
@@ -132,7 +131,7 @@ def study(
         "compared": scene.compare or "solver",
         "lines": kept,
     }  # fmt: skip
-    result["failures"] = failures(result)
+    result["missed"] = missed(result)
     return Study(result, {"schema": 1, "scene": scene.name, "lines": timed}, problems[shown], drawn)
 
 
@@ -191,50 +190,10 @@ def _finished(
 
 def _described(run: Run, size: int, arrays: Mapping[str, Any], large: bool) -> dict[str, Any]:
     outcome = run.outcome(arrays)
-    answers = []
-    for known in run.problem.known:
-        found, exact, error = known.compared(outcome)
-        answers.append({"name": known.name, "unit": known.unit, "found": found, "exact": exact, "error": error,
-                        "expected order": known.order,
-                        "within": known.within if large or known.order is None else None})  # fmt: skip
     return {
         "size": size,
         "unknowns": int(run.system.count),
         "energies": {term.name: term.table.count for term in run.problem.terms},
         "iterations": int(arrays["iterations"]),
-        "answers": answers,
+        "answers": [answer(known, outcome, large) for known in run.problem.known],
     }
-
-
-def _with_orders(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Observed orders, between each size and the one before: log(error ratio)/log(size ratio)."""
-    for number, run in enumerate(runs):
-        for k, answer in enumerate(run["answers"]):
-            answer["order"] = None
-            if number and answer["expected order"] is not None:
-                before = runs[number - 1]
-                coarse, fine = before["answers"][k]["error"], answer["error"]
-                if coarse > 0 and fine > 0:
-                    answer["order"] = math.log(coarse / fine) / math.log(run["size"] / before["size"])
-    return runs
-
-
-def failures(result: Mapping[str, Any]) -> list[str]:
-    """Goals that a result misses: errors above what is allowed, orders that are not the expected ones."""
-    found = []
-    for line in result["lines"]:
-        for number, run in enumerate(line["runs"]):
-            last = number == len(line["runs"]) - 1
-            for answer in run["answers"]:
-                what = f"{result['scene']}, {line['name']}, size {run['size']}: {answer['name']}"
-                if answer["within"] is not None and not answer["error"] <= answer["within"]:
-                    found.append(f"{what} has the error {answer['error']:.1e}, and {answer['within']:.0e} is allowed")
-                if (
-                    last
-                    and answer["order"] is not None
-                    and not abs(answer["order"] - answer["expected order"]) <= SLACK
-                ):
-                    found.append(
-                        f"{what} has the order {answer['order']:.2f}, and {answer['expected order']:g} is expected"
-                    )
-    return found

@@ -6,7 +6,7 @@ after the other in one banded matrix. Sums are NumPy's own, not those of BLAS, w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from yarnverify.simulation.linear.protocol import LinearSolveError, pattern_of, 
 from yarnverify.simulation.linear.threads import one_thread
 
 Array = NDArray[Any]
+COLUMNS = 32768  # of the matrix at a time
 
 
 def lines_of(fabric: Any, system: Any) -> list[Array]:
@@ -82,23 +83,36 @@ def _band(matrix: Any, line: Array) -> tuple[int, Array, Array]:
     """Width of the band of a line, and where its entries come from and go to."""
     place = np.full(matrix.shape[0], -1, np.int32)
     place[line] = np.arange(line.size, dtype=np.int32)
-    column = place[np.repeat(np.arange(matrix.shape[0], dtype=np.int32), np.diff(matrix.indptr))]
-    row = place[matrix.indices]
     # entries between different yarns that lie one after the other belong to the band as well, if they are near
-    near = np.flatnonzero((column >= 0) & (row >= column))
-    distance = (row[near] - column[near]).astype(np.int64)
-    width = _width(distance)
-    inside = distance <= width
-    near, distance = near[inside], distance[inside]
-    kind = np.int32 if max(matrix.nnz, line.size * (width + 1)) < 2**31 else np.int64
-    return width, near.astype(kind), (column[near] * (width + 1) + distance).astype(kind)
+    counts = np.zeros(line.size, np.int64)
+    for _, _, distance in _inside(matrix, place, line.size):
+        counts += np.bincount(distance, minlength=line.size)
+    width = _width(counts)
+    kind: Any = np.int32 if max(matrix.nnz, line.size * (width + 1)) < 2**31 else np.int64
+    found = [(at.astype(kind), (column * (width + 1) + distance).astype(kind))
+             for at, column, distance in _inside(matrix, place, width + 1)]  # fmt: skip
+    source, target = (np.concatenate([np.empty(0, kind), *parts]) for parts in zip(*found, strict=True))
+    return width, source, target
 
 
-def _width(distance: Array) -> int:
+def _inside(matrix: Any, place: Array, reach: int) -> Iterator[tuple[Array, Array, Array]]:
+    """Entries of the lower triangle of a line nearer to its diagonal than ``reach``: where, column in the line, distance.
+
+    Some columns of the matrix at a time, since what is needed on the way is larger than the band.
+    """
+    for first in range(0, matrix.shape[1], COLUMNS):
+        last = min(first + COLUMNS, matrix.shape[1])
+        part = slice(int(matrix.indptr[first]), int(matrix.indptr[last]))
+        column = np.repeat(place[first:last], np.diff(matrix.indptr[first : last + 1])).astype(np.int64)
+        distance = place[matrix.indices[part]] - column
+        near = np.flatnonzero((column >= 0) & (distance >= 0) & (distance < reach))
+        yield part.start + near, column[near], distance[near]
+
+
+def _width(counts: Array) -> int:
     """The distance to which the entries of nearly every unknown of a line reach, without a gap."""
-    if not distance.size:
+    if not counts.size:
         return 0
-    counts = np.bincount(distance)
     often = counts > counts[0] // 50
     return int(np.argmin(often) - 1) if not often.all() else len(counts) - 1
 

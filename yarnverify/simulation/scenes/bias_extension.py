@@ -65,8 +65,8 @@ def bias_extension(
         turns = np.bincount(gap[there], np.arctan2(edge[1], edge[0])[there]) / np.maximum(np.bincount(gap[there]), 1)
         return float(2 * turns[size:].mean())
 
-    # yarns stretch by about size k_x/(k_s cos gamma), which adds up over as many cells
-    stretched = min(0.01, 32 * size**2 * k_x / k_s / math.cos(gamma))
+    # yarns stretch by about size k_x/(k_s cos^2 gamma), which adds up over as many cells
+    stretched = min(0.01, 32 * size**2 * k_x / k_s / math.cos(gamma) ** 2)
     uneven = 2 * turned[size:along].mean() / gamma - 1
     known = [
         Known("shear angle of a quadrant", "rad", of_warp + of_weft, lambda end: abs(deviations(end.Q, table)),
@@ -74,6 +74,6 @@ def bias_extension(
         Known("shear angle, mean of the central zone", "rad", gamma, mean, within=stretched + abs(uneven)),
     ]  # fmt: skip
     active = fabric.positions(np.flatnonzero((row > 0) & (row < 2 * along)), "xy")
-    count = math.ceil(gamma / 0.1) or 1
+    count = math.ceil(delta / L)  # so that the grip moves by no more than a cell
     stages = [Stage(held=pulled(k / count)) for k in range(1, count + 1)]
     return Static(fabric, terms, active, known, stages, colour="shear", view="top")

@@ -40,12 +40,15 @@ def catenary(
         Term(stretch, segments(fabric), {"k_s": k_s}),
         Term(gravity, segments(fabric, gravity), {"rho": rho, "g": (0, 0, -g)}),
     ]
+    if size * span < length:
+        raise InputError(f"segments of {length / size:g} m do not hang in a span of {span:g} m: take more of them")
     chain = answers.hung_chain([length / size] * size, span=span, rise=rise, k_s=k_s, rho=rho, g=g)
     limit = answers.catenary(length, span, rise).at(np.arange(size + 1) * length / size)
     known = [
         Known("place of a node, of a chain", "m", chain.points, lambda end: end.points[:, [0, 2]]),
-        Known("place of a node, of a yarn", "m", limit, lambda end: end.points[:, [0, 2]], 2, 1e-4),
-    ]
+        Known("place of a node, of a yarn", "m", limit, lambda end: end.points[:, [0, 2]], 2, 1e-4,
+              floor=chain.tension.max() / k_s),
+    ]  # fmt: skip
     part = np.linspace(0, 1, size + 1)
     start = fabric.Q.copy()
     sag = math.sqrt(3 / 8 * (length - span) * length)  # of a parabola about as long as the yarn

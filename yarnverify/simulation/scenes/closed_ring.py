@@ -10,7 +10,7 @@ from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.fabric import bends, ring, segments
 from yarnverify.simulation.quantities import positive
 from yarnverify.simulation.scene import scene
-from yarnverify.simulation.setting import Known, Static
+from yarnverify.simulation.setting import Known, Static, rounding
 
 
 @scene(
@@ -26,16 +26,19 @@ def closed_ring(
     length: float = positive(0.05, "m"),
     flat: float = positive(0.7, "", "height of the ellipse at the start, over that of the circle"),
     k_b: float = positive(1e-9, "N m^2", "EI of a solid cotton yarn, E = 0.8 GPa, R = 0.2 mm"),
-    k_s: float = positive(50.0, "N", "Y pi R^2 with Y = 0.4 GPa"),
+    k_s: float = positive(
+        1e-3, "N", "any: nothing is stretched; soft, so that rounding of coordinates makes little force"
+    ),
 ) -> Static:
     fabric = ring(length, size)
     terms = [Term(stretch, segments(fabric), {"k_s": k_s}), Term(bending, bends(fabric), {"k_b": k_b})]
     start = fabric.Q.copy()
     fabric.points(start)[:, :2] *= [1 / flat, flat]
+    radius = np.full(size, length / size / (2 * math.sin(math.pi / size)))
     known = [
         Known("energy of bending", "J", ring_energy(k_b, length), lambda end: end.system.energies(end.Q)["bending"]),
-        Known("distance of a node from the middle", "m", np.full(size, length / size / (2 * math.sin(math.pi / size))),
-              lambda end: np.linalg.norm(end.points - end.points.mean(axis=0), axis=1)),
+        Known("distance of a node from the middle", "m", radius,
+              lambda end: np.linalg.norm(end.points - end.points.mean(axis=0), axis=1), within=rounding(k_s * length**2 / k_b)),
     ]  # fmt: skip
     held = [*fabric.positions([0], "xy"), *fabric.positions([size // 2], "y")]
     active = np.setdiff1d(fabric.positions(axes="xy"), held)

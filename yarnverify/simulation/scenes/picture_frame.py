@@ -11,7 +11,7 @@ from yarnverify.simulation.fabric import segments, shears, weave
 from yarnverify.simulation.quantities import positive, real
 from yarnverify.simulation.readings import deviations
 from yarnverify.simulation.scene import scene
-from yarnverify.simulation.setting import Array, Known, Outcome, Stage, Static
+from yarnverify.simulation.setting import Array, Known, Outcome, Stage, Static, rounding
 
 
 @scene(
@@ -53,7 +53,7 @@ def picture_frame(
         bars = fabric.positions(fabric.crossings[~inside])
         return float(end.system.slope(end.Q)[bars] @ Q[bars]) / (side * math.sin(math.pi / 4 - gamma / 2))
 
-    count = math.ceil(abs(gamma) / 0.1) or 1
+    count = math.ceil(abs(gamma) * size) or 1  # so that the bars move by less than a cell
     known = [
         Known(
             "shear angle of a quadrant",
@@ -61,7 +61,7 @@ def picture_frame(
             np.full(table.count, abs(gamma)),
             lambda end: abs(deviations(end.Q, table)),
         ),
-        Known("pulling force", "N", force, pull),
+        Known("pulling force", "N", force, pull, within=rounding(size**2 * k_s / abs(force or k_s))),
     ]
     stages = [Stage(held=sheared(gamma * k / count)) for k in range(1, count + 1)]
     return Static(fabric, terms, active, known, stages, colour="shear", view="top")

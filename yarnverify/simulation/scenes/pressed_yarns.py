@@ -27,7 +27,7 @@ def pressed_yarns(
     L: float = positive(0.9e-3, "m", "a dense cloth"),
     R: float = positive(0.2e-3, "m", "a cotton yarn"),
 ) -> Static:
-    fabric = weave("twill 2/2", (1, size), L, R)
+    fabric = weave("twill 2/2", (1, size), L, R, pressed=True)
     table = contacts(fabric)
     along = fabric.yarns[0].slides
     d = table.parameters["d"]

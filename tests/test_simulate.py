@@ -1,0 +1,259 @@
+"""``yarnverify simulate``: files, runs that are interrupted and go on, and one clear error for what cannot be."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from yarnverify import cli
+from yarnverify.errors import InputError, NotRunError
+from yarnverify.simulation import command
+
+STAGED = """
+import os, signal, time
+from yarnverify.kernels import gravity, kinetic, stretch
+from yarnverify.simulation.assembly import Term
+from yarnverify.simulation.fabric import segments, yarn
+from yarnverify.simulation.quantities import choice, positive, whole
+from yarnverify.simulation.scene import scene
+from yarnverify.simulation.setting import Known, Moving, Static, ramp
+
+
+@scene(title="a swing", size="segments", sizes=(3,), solvers=("direct",))
+def swing(size: int, until: float = positive(0.2, "s"), steps: int = whole(40), pause: float = positive(1e-9, "s"),
+          rest: str = choice("no", "yes")) -> Moving | Static:
+    fabric = yarn(0.1, size)
+    terms = [Term(stretch, segments(fabric), {"k_s": 1.0}),
+             Term(gravity, segments(fabric, gravity), {"rho": 1e-3, "g": (0, 0, -9.81)})]
+    mass = Term(kinetic, segments(fabric, kinetic), {"rho": 1e-3})
+    seen = []
+
+    def waited(at):
+        time.sleep(pause if pause > 1e-6 else 0)
+        seen.append(1)
+        if len(seen) == int(os.environ.get("STOP_AT", 0)):
+            os.kill(os.getpid(), int(os.environ["STOP_BY"]))
+        return at.system.energy(at.Q)
+
+    common = dict(watch={"energy": waited})
+    free = fabric.positions(range(1, size + 1))
+    if rest == "yes":
+        loads = 0 * fabric.Q
+        loads[fabric.position(size)[0]] = [1e-3, 0, 5e-3]
+        return Static(fabric, terms, free, stages=ramp(loads, steps), **common)
+    return Moving(fabric, terms, free, mass, until, until / steps, frames=5, **common)
+"""
+
+
+@pytest.fixture
+def swing(tmp_path: Path) -> Path:
+    path = tmp_path / "swing.py"
+    path.write_text(STAGED, encoding="utf-8")
+    return path
+
+
+def run(scene: str, out: Path | None = None, **more: Any) -> Any:
+    options: dict[str, Any] = {"sizes": (), "given": (), "solver": None, "resume": False, "every": 10.0, "pictures": False,
+                               "tell": lambda label, done: None}  # fmt: skip
+    return command.simulate(scene, out=out, **{**options, **more})
+
+
+def shell(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-m", "yarnverify", "simulate", *arguments], capture_output=True, text=True,
+                          env={**os.environ, **environment}, timeout=120)  # fmt: skip
+
+
+def states(folder: Path) -> dict[str, dict[str, Any]]:
+    """Every saved array of a run but the seconds that it took."""
+    found = {}
+    for path in sorted((folder / "states").glob("*.npz")):
+        with np.load(path) as file:
+            found[path.name] = {name: file[name].tobytes() for name in file.files if name != "seconds"}
+    return found
+
+
+def frames(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in sorted([*folder.glob("*.vtp"), *folder.glob("*.pvd")])}
+
+
+# -- what is written --------------------------------------------------------------------------------------------------
+
+
+def test_files_of_a_study_are_the_same_bytes_twice(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        run("hanging_yarn", tmp_path / name, sizes=(4, 8))
+    one, two = tmp_path / "one", tmp_path / "two"
+    assert (one / "result.json").read_bytes() == (two / "result.json").read_bytes()
+    assert frames(one) == frames(two) and len(frames(one)) == 3
+    record = json.loads((one / "result.json").read_text(encoding="utf-8"))
+    assert record["lines"][0]["runs"][1]["energies"] == {"stretch": 8, "gravity": 8}
+    assert record["parameters"]["k_s"]["unit"] == "N" and "seconds" not in (one / "result.json").read_text(
+        encoding="utf-8"
+    )
+    timings = json.loads((one / "timings.json").read_text(encoding="utf-8"))
+    assert [line["name"] for line in timings["lines"]] == ["direct", "superlu"]
+
+
+def test_a_new_run_in_the_same_folder_leaves_nothing_of_the_old_one(tmp_path: Path, swing: Path) -> None:
+    run(str(swing), tmp_path / "out", given=("steps=10",))
+    run(str(swing), tmp_path / "out", given=("steps=4", "rest=yes"), sizes=(5,))
+    assert list(states(tmp_path / "out")) == ["direct-5.npz"]
+    assert len(frames(tmp_path / "out")) == 6  # start, four stages, and their list
+
+
+def test_nothing_is_written_without_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    run("pressed_yarns", sizes=(3,))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_pictures(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    _, lines = run("closed_ring", tmp_path, sizes=(3, 6), solver="direct", pictures=True)
+    for name in ("closed_ring.png", "closed_ring.html", "closed_ring-precision.svg", "closed_ring-precision.png"):
+        assert (tmp_path / name).stat().st_size > 1000 and name in lines[-1]
+
+
+# -- runs that are interrupted ----------------------------------------------------------------------------------------
+
+
+HOW = [(signal.SIGINT, "no"), (signal.SIGTERM, "yes"), (signal.SIGKILL, "no")]
+
+
+@pytest.mark.parametrize(("how", "rest"), HOW)
+def test_an_interrupted_run_goes_on_to_the_same_bits(
+    tmp_path: Path, swing: Path, how: signal.Signals, rest: str
+) -> None:
+    arguments = [str(swing), "--set", f"rest={rest}", "--size", "2", "3", "--no-pictures", "--out"]
+    whole, parted = tmp_path / "whole", tmp_path / "parted"
+    assert shell(*arguments, str(whole)).returncode == 0
+    # within the second size, after some of its steps; kept after each step, so that SIGKILL finds something
+    stopped = shell(*arguments, str(parted), "--every", "0", STOP_AT="25", STOP_BY=str(int(how)))
+    if how is signal.SIGKILL:
+        assert stopped.returncode == -signal.SIGKILL
+    else:
+        assert stopped.returncode == 3 and "--resume goes on" in stopped.stderr and stopped.stderr.count("\n") == 1
+    done = [len(np.load(path)["recorded time"]) for path in sorted((parted / "states").glob("*.npz"))]
+    assert 20 < done[-1] < 30
+    again = shell(*arguments, str(parted), "--resume")
+    assert again.returncode == 0, again.stderr
+    assert states(parted) == states(whole) and frames(parted) == frames(whole)
+    assert (parted / "result.json").read_bytes() == (whole / "result.json").read_bytes()
+
+
+def test_going_on_with_a_run_that_is_done_changes_nothing(tmp_path: Path, swing: Path) -> None:
+    run(str(swing), tmp_path / "out", given=("steps=6",))
+    before = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir() if path.is_file()}
+    run(str(swing), tmp_path / "out", given=("steps=6",), resume=True)
+    assert before == {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir() if path.is_file()}
+
+
+# -- what cannot be ---------------------------------------------------------------------------------------------------
+
+
+def test_another_run_is_not_gone_on_with(tmp_path: Path, swing: Path) -> None:
+    run(str(swing), tmp_path / "out", given=("steps=6",))
+    with pytest.raises(InputError, match=r"belongs to another run: until = 0.2, not 0.1"):
+        run(str(swing), tmp_path / "out", given=("steps=6", "until=0.1"), resume=True)
+    swing.write_text(STAGED + "\n# changed", encoding="utf-8")
+    with pytest.raises(InputError, match="belongs to another run: scene = "):
+        run(str(swing), tmp_path / "out", given=("steps=6",), resume=True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        (["hangingyarn"], 2, "there is no scene 'hangingyarn'; did you mean hanging_yarn?"),
+        (["zebra"], 2, "there is no scene 'zebra'; there are hanging_yarn"),
+        (["hanging_yarn", "--size", "0"], 2, "hanging_yarn: the size, segments, must be a whole number, at least 1; not 0"),
+        (["hanging_yarn", "--size", "x"], 2, 'unable to convert "x" into int'),
+        (["hanging_yarn", "--set", "k_s=-2"], 2, "hanging_yarn: k_s must be positive, in N; not '-2'"),
+        (["hanging_yarn", "--set", "k_s"], 2, "--set takes name=value; not 'k_s'"),
+        (["hanging_yarn", "--set", "g=1", "g=2"], 2, "--set gives g twice"),
+        (["hanging_yarn", "--set", "tip_force=-1"], 2, "tip_force = -1 N lifts the yarn"),
+        (["hanging_yarn", "--solver", "magic"], 2, "there is no solver 'magic'; there are direct, superlu"),
+        (["hanging_yarn", "--resume"], 2, "--resume needs --out"),
+        (["hanging_yarn", "--resume", "--out", "nowhere"], 2, "nowhere holds no run to go on with"),
+        (["hanging_yarn", "--out", "file.txt"], 2, "file.txt is not a folder"),
+        (["hanging_yarn", "--out", "out", "--every", "nan"], 2, "--every takes seconds, 0 or more"),
+        (["none.py"], 2, "there is no file none.py"),
+        (["bad.py"], 2, "bad.py:2:"),
+        (["raising.py"], 2, "raising.py:2:1: ZeroDivisionError: division by zero"),
+        (["empty.py"], 2, "empty.py must declare one scene, a function under @scene(...); it declares 0"),
+        (["elastica", "--set", "alpha=1e9"], 2, "alpha = P L^2/EI must be positive and at most 100000"),
+        (["bias_extension", "--set", "strain=2"], 2, "the cloth cannot be deformed so far"),
+    ],
+)  # fmt: skip
+def test_one_clear_error(
+    arguments: list[str], status: int, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    for name, text in (("bad", "x = 1\ndef"), ("raising", "x = 1\n1 / 0"), ("empty", ""), ("file", "")):
+        Path(f"{name}.{'txt' if name == 'file' else 'py'}").write_text(text, encoding="utf-8")
+    monkeypatch.setattr(sys, "argv", ["yarnverify", "simulate", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    shown = capsys.readouterr()
+    assert ended.value.code == status and message in shown.err, shown.err
+    assert shown.err.count("\n") == 1 and not shown.out
+
+
+def test_missed_goals_are_exit_status_1(
+    swing: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    swing.write_text(STAGED.replace("common = dict(", "common = dict(known=[Known('x', 'm', 1.0, lambda end: 2.0)], "))
+    monkeypatch.setattr(sys, "argv", ["yarnverify", "simulate", str(swing), "--set", "steps=2", "rest=yes"])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert ended.value.code == 1
+    assert "swing, direct, size 3: x has the error 1.0e+00, and 1e-12 is allowed" in capsys.readouterr().out
+
+
+def test_scenes_are_listed(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    from yarnverify.simulation.scenes import SCENES
+
+    monkeypatch.setattr(sys, "argv", ["yarnverify", "simulate"])
+    with pytest.raises(SystemExit, match="0"):
+        cli.main()
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == [scene.name for scene in SCENES]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of processes")
+def test_a_full_disk_is_one_error(tmp_path: Path, swing: Path) -> None:
+    import resource
+
+    def full() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))
+
+    command = [
+        sys.executable,
+        "-m",
+        "yarnverify",
+        "simulate",
+        str(swing),
+        "--no-pictures",
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    ended = subprocess.run(command, capture_output=True, text=True, preexec_fn=full, timeout=60)
+    assert ended.returncode == 3 and ended.stderr.count("\n") == 1
+    assert "File too large" in ended.stderr and not list((tmp_path / "out").rglob("*.part*"))
+
+
+def test_a_run_without_solution_tells_where_its_last_good_state_is(tmp_path: Path, swing: Path) -> None:
+    text = STAGED.replace('rest == "yes":', 'rest == "yes":\n        common["options"] = {"iterations": 1}')
+    swing.write_text(text, encoding="utf-8")
+    with pytest.raises(
+        NotRunError, match=r"swing at size 3, direct, after 0 stages: no equilibrium after 1 iterations"
+    ):
+        run(str(swing), tmp_path / "out", given=("rest=yes",))
