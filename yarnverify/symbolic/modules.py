@@ -206,7 +206,10 @@ def derived_programs(energy: Energy, found: Proved, variant: str) -> tuple[list[
         return [found.stages.program()], [_PLAIN_SUMS] if variant == "accurate" else []
     if found.derivation is None:
         note = "this energy is no law of known measures: plain differentiation, nothing is done for its singular states"
-        return [plain_program(energy, declared_section(energy))], [note]
+        section = declared_section(energy)
+        return [plain_program(energy, section) if variant == "differentiated" else Stages(energy, section).program()], [
+            note
+        ]
     if variant == "differentiated":
         return [derived_program(energy, found.derivation)], []
     if not found.shapes:
