@@ -63,6 +63,11 @@ def test_kernels_of_the_package_pass(energy: str, variant: str) -> None:
         ("bending_force_unsaid", {"returns": ("_", "force", "hessian")}),
         ("stretch_by_radius", {"given": ("R=0.25", "Y=k_s/(pi*R**2)")}),
         ("bending_without_stiffness", {"fix": ("k_b=1",)}),
+        (
+            "stretch_sliding_forces",
+            {"returns": ("u0", "u1"), "force": True, "regimes": ("moderate", "sliding", "ratios")},
+        ),
+        ("bending_of_a_chain", {"order": "x1,x0,x2,u1,u2", "given": ("x0=x1", "x1=x0")}),
     ],
 )
 def test_right_ones_pass_in_every_manner(name: str, options: dict[str, Any]) -> None:
@@ -125,6 +130,20 @@ def test_another_convention_is_found(name: str, options: dict[str, Any], hint: s
     found = checked(name, **options)
     assert not found.passes
     assert any(hint in text for text in found.hints), (found.hints, said(found))
+
+
+def test_two_mistakes_in_one_block() -> None:
+    options = {"force": True, "returns": ("x1", "x3"), "fix": ("k_x=120", "L=1"), "regimes": ("moderate",)}
+    text = said(checked("shear_without_lengths", **options))
+    assert "wrong: G[x1]: takes 1.57 for pi/2, and lacks a factor 1/(|x1 - x0| sin(angle))" in text
+    assert "wrong: G[x3]: takes 1.57 for pi/2, and lacks a factor 1/(|x3 - x0| sin(angle))" in text
+
+
+def test_other_names_are_found() -> None:
+    (hint,) = checked("bending_of_a_chain").hints
+    words = hint.split()
+    given = tuple(words[i + 1] for i, word in enumerate(words) if word == "--with")
+    assert checked("bending_of_a_chain", order=words[words.index("--order") + 1], given=given).passes
 
 
 def test_another_order_is_found() -> None:

@@ -398,7 +398,8 @@ def _judged(
             for _, diagnosis in found
         )
         if again is not None and unknown and not checked.hints:
-            checked.hints = order_hint(convention, cases, again, False)
+            by_name = bool(ran.decided and ran.decided.get("by_name"))
+            checked.hints = order_hint(convention, cases, again, by_name)
     return checked
 
 

@@ -24,6 +24,7 @@ from yarnverify.symbolic.declare import Energy
 Array = NDArray[Any]
 Status = Literal["pass", "not judged", "wrong", "approximate", "loses digits", "no value"]
 _APPROXIMATE = 1e3  # units: what no rounding of a right formula loses where nothing is hard
+_ROUNDED = (1.57, 1.571, 1.5708, 1.570796)  # what people write for pi/2
 _NEAR = 0.1  # rad: a state that is nearer to a special angle than this is near it
 
 
@@ -109,7 +110,9 @@ class Judge:
             known = factor(found, self.named(np.flatnonzero(at)[live]), self.tolerance)
             if known is not None:
                 return _factor_text(known), known
-            offset = self._right_angle(found, np.flatnonzero(at)[live])
+            offset = self._right_angle(found, np.flatnonzero(at)[live]) or self._rounded(
+                found, np.flatnonzero(at)[live]
+            )
             if offset:
                 return offset, None
         for test in (self._printed_block, self._transposed, self._other_block, self._first_derivatives, self._definite):
@@ -189,6 +192,15 @@ class Judge:
         if not np.isfinite(offset).all() or abs(middle) > 0.2 or np.abs(offset - middle).max() > 1e-3 * abs(middle):
             return ""
         return f"takes {np.pi / 2 - middle:.8g} for pi/2"
+
+    def _rounded(self, found: Array, at: Array) -> str:
+        """A factor besides a rounded right angle."""
+        angle = self.angle[at]
+        for value in _ROUNDED:
+            known = factor(found * (angle - np.pi / 2) / (angle - value), self.named(at), self.tolerance)
+            if known is not None:
+                return f"takes {value} for pi/2, and {_factor_text(known)}"
+        return ""
 
     # -- the digits
 
