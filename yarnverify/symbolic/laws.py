@@ -7,6 +7,7 @@ from typing import Any
 import sympy as sp
 
 from yarnverify.symbolic.document import Section
+from yarnverify.symbolic.functions import unfolded
 from yarnverify.symbolic.measures import Measure, NoMeasuresError, Segment, scalar_name, scalar_symbol
 from yarnverify.symbolic.tree import Expr, Name
 
@@ -51,6 +52,9 @@ class Law:
                     scale, segment = self.vector(args[0])
                     return self._absolute(scale) * self._length(segment)
             case "call":
+                plain = unfolded(expr)
+                if plain is not None:
+                    return self.scalar(plain)
                 if expr.value == "arccos":
                     return self._angle(args[0])
                 function = {"sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "log": sp.log, "exp": sp.exp}[str(expr.value)]

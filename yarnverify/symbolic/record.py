@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -13,16 +14,18 @@ import numpy as np
 
 from yarnverify.library import Shelf
 from yarnverify.source import Source
+from yarnverify.symbolic.algebraic import UndefinedError
 from yarnverify.symbolic.court import Verdict
 from yarnverify.symbolic.declare import Declarations, load_declarations
 from yarnverify.symbolic.derive import derive
 from yarnverify.symbolic.document import Section, block_of, instantiate
 from yarnverify.symbolic.forward import Evaluation, entries
 from yarnverify.symbolic.latex import latex
-from yarnverify.symbolic.numbers import Balls, UndefinedError
+from yarnverify.symbolic.numbers import Balls
 from yarnverify.symbolic.prove import Completeness, Judged, Trial, read_with, try_document
 from yarnverify.symbolic.repair import Repair, Workshop, chain_latex, describe
-from yarnverify.symbolic.tree import FORCE, Expr, Name
+from yarnverify.symbolic.scalars import origin_last
+from yarnverify.symbolic.tree import FORCE, Expr, Name, rebuild
 
 SCHEMA = 1
 _ASIDE = Fraction(1, 2**20)  # how far from rest a formula is evaluated that is 0/0 at rest
@@ -157,11 +160,19 @@ def _derived_block(section: Section, energy: Expr, block: Expr) -> Expr | None:
     derivation = derive(energy, section, tuple(dict.fromkeys([*section.unknowns, *names])))
     if derivation is None:
         return None
+    derivation, tree = replace(derivation, order=origin_last), None
     if block.op == "force":
-        return derivation.gradient(block.name, FORCE)
-    if block.op == "derivative" and block.args[0].op == "force":
-        return derivation.hessian(block.args[0].name, block.name, FORCE)
-    return None
+        tree = derivation.gradient(block.name, FORCE)
+    elif block.op == "derivative" and block.args[0].op == "force":
+        tree = derivation.hessian(block.args[0].name, block.name, FORCE)
+
+    def spelled_out(node: Expr) -> Expr | None:
+        """What a symbol stands for that the document does not define."""
+        known = node.op != "symbol" or section.meaning(node.name) is not None
+        meaning = None if known else derivation.section.meaning(node.name)
+        return meaning and rebuild(meaning, spelled_out)
+
+    return tree and rebuild(tree, spelled_out)
 
 
 # -- witnesses --------------------------------------------------------------------------------------------------------

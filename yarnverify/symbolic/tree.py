@@ -252,11 +252,12 @@ def type_of(expr: Expr, lookup: Callable[[Name], Type]) -> Type:
                 raise ShapeError(expr.args[1], f"cannot divide by a {kinds[1].value}")
             return kinds[0]
         case "pow" | "sqrt" | "abs" | "call":
-            if kinds[0] not in (Type.SCALAR, Type.UNKNOWN):
+            wrong = [i for i, kind in enumerate(kinds) if kind not in (Type.SCALAR, Type.UNKNOWN)]
+            if wrong:
                 what = {"pow": "raise {} to a power", "sqrt": "take the square root of {}"}.get(
                     expr.op, f"take {expr.value or 'the absolute value'} of {{}}"
                 )
-                raise ShapeError(expr.args[0], "cannot " + what.format(f"a {kinds[0].value}"))
+                raise ShapeError(expr.args[wrong[0]], "cannot " + what.format(f"a {kinds[wrong[0]].value}"))
             return Type.SCALAR
         case "norm":
             if kinds[0] is Type.MATRIX:
