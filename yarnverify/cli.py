@@ -431,8 +431,8 @@ def check(
         module:function, file.py:function, a module or file with functions energy, gradient or force, hessian or jacobian;
         or library.so:function with the C interface that README.md describes.
     """
-    from yarnverify.check.command import Options, write_states
     from yarnverify.check.command import check as checked
+    from yarnverify.check.setting import Options, write_states
     from yarnverify.check.show import record, show
 
     options = Options(
