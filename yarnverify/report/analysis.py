@@ -71,7 +71,7 @@ def _steps(record: dict[str, Any]) -> Table:
     rows = tuple((row["energy"], _number(row["omega"]), _number(row["step"])) for row in record["steps"]["rows"])
     notes = (
         "Mass lumped at the nodes, all nodes free, sliding held: without friction or a mass of its own, sliding along a "
-        "straight yarn moves no material, and bounds no step. h = 2/omega for central differences at rest; bending gets stiffer "
+        "straight yarn moves no material, and bounds no step. h = 2/omega for central differences at rest; bending stiffens "
         "without bound as its angle goes to pi, shear as its goes to 0 or pi.",
     )
     size = record["steps"]["size"]
