@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from base64 import b64encode
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +39,7 @@ def page(
     pictures: Mapping[str, str],
     name: str = "",
     *,
+    gallery: Sequence[Mapping[str, Any]] = (),
     photos: Mapping[str, bytes] | None = None,
     turned: Mapping[str, str] | None = None,
 ) -> str:
@@ -52,6 +53,8 @@ def page(
         Name without suffix to SVG text, of those that were drawn.
     name
         What the command line calls the folder that it is about; empty for the one that comes with the package.
+    gallery
+        Results of scenes as ``yarnverify simulate --out`` writes them, shown where the record of simulations lacks them.
     photos, turned
         Name of a scene to its picture as PNG, and to the page that shows it in three dimensions.
     """
@@ -85,7 +88,7 @@ def page(
         fabric=fabric_line(analysis) if analysis else "",
         benchmark=records.get("benchmark"),
         simulation=simulation,
-        scenes=scenes(simulation),
+        scenes=scenes(simulation, gallery),
         overview=overview(simulation) if simulation else None,
         photos={scene: b64encode(data).decode() for scene, data in (photos or {}).items()},
         turned=turned or {},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,8 @@ class Shown:
 
     Attributes
     ----------
+    size
+        What its size counts, and the largest that was run.
     missed
         Goals that were missed, a line each.
     parameters
@@ -27,14 +29,18 @@ class Shown:
     title: str
     source: str
     wall: str
+    size: tuple[str, int]
     missed: tuple[str, ...]
     parameters: Table
     runs: Table | None
 
 
-def scenes(record: Mapping[str, Any] | None) -> list[Shown]:
-    """The scenes of a record, in its order; none where the record is missing."""
-    return [] if record is None else [_shown(each["result"], each.get("timings")) for each in record["scenes"]]
+def scenes(record: Mapping[str, Any] | None, gallery: Sequence[Mapping[str, Any]] = ()) -> list[Shown]:
+    """The scenes of a record, in its order, then those results of a gallery that it lacks."""
+    recorded = [] if record is None else record["scenes"]
+    known = {each["result"]["scene"] for each in recorded}
+    found = [_shown(each["result"], each.get("timings")) for each in recorded]
+    return [*found, *(_shown(result, None) for result in gallery if result["scene"] not in known)]
 
 
 def overview(record: Mapping[str, Any]) -> Table:
@@ -72,6 +78,7 @@ def _shown(result: Mapping[str, Any], timings: Mapping[str, Any] | None) -> Show
         result["title"],
         result["source"],
         result["wall"],
+        (result["size"], result["lines"][0]["runs"][-1]["size"]),
         tuple(result.get("missed", ())),
         Table("Parameters", ("parameter", "value", "reason or source"), parameters),
         _runs(result, timings) if result["lines"][0]["runs"][0]["answers"] else None,
