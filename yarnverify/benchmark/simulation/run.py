@@ -187,7 +187,7 @@ def _cantilever(goal: float, peers: Sequence[str], rounds: int, advance: Callabl
 
 def _maker(name: str, goal: float) -> tuple[Callable[[int], Solve], Sequence[str], Sequence[int]]:
     if name in OWN:
-        engine = "numpy" if name == OWN[1] else "compiled"
+        engine = "numpy" if name.endswith("NumPy") else "compiled"
         if engine == "compiled":
             importlib.import_module("numba")
         return lambda n: ours(n, ALPHA, engine), ["numba"] if engine == "compiled" else [], SEGMENTS
