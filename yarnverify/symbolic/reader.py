@@ -337,6 +337,15 @@ class _Build(Transformer[Token, Any]):
     def call_power(self, meta: Meta, items: list[Any]) -> Expr:
         return self._node(meta, "pow", self.call(meta, [items[0], items[2]]), value=int(items[1][-1]))
 
+    def call_raised(self, meta: Meta, items: list[Any]) -> Expr:
+        function, exponent, argument = items
+        if exponent < 0:
+            self.complain(
+                meta.start_pos + self.shift,
+                f"{function}^{{{exponent}}} may mean two things: write \\arc{function[1:]}, or \\frac{{1}}{{{function} ...}}",
+            )
+        return self._node(meta, "pow", self.call(meta, [function, argument]), value=exponent)
+
     def call_of_two(self, meta: Meta, items: list[Any]) -> Expr:
         return self._node(meta, "call", items[2], items[3], value="atan2")
 
