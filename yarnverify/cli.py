@@ -328,6 +328,9 @@ def report(
         bool, Parameter(negative="", help="Draw the pictures of measured records (needs matplotlib).")
     ] = False,
     json_file: Json = None,
+    junit: Junit = None,
+    summary: Summary = None,
+    annotations: Annotations = False,
 ) -> None:
     """All of it, to reports/: verdicts, corrections, derivations, kernels, and what was measured; a page an energy.
 
@@ -337,11 +340,17 @@ def report(
         Folder with energies, and perhaps a document, of your own: its kernels are written to FOLDER/kernels and measured.
         The paper's by default.
     """
+    from yarnverify import ci
     from yarnverify.project import project
     from yarnverify.reporting import build_report
 
+    of = project(folder)
     with progress("reporting") as advance:
-        outcome = build_report(out, check, advance, pictures, project(folder))
+        outcome = build_report(out, check, advance, pictures, of)
+    path, found = ci.shown_path(of.folder / of.document), ci.of_report(outcome.verdicts, outcome.record)
+    ci.write(found, path, junit, summary)
+    if annotations:
+        outcome.lines += ci.workflow_commands(found, path)
     _finish(outcome, json_file)
 
 
