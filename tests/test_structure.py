@@ -165,9 +165,9 @@ def test_readme_document_is_read_and_proved(tmp_path: Path) -> None:
 
 
 def test_doctests_of_the_package() -> None:
-    import yarnverify.symbolic.formulas
+    import yarnverify.symbolic.grammar
     import yarnverify.symbolic.latex
     import yarnverify.symbolic.plain
 
-    for module in (yarnverify.symbolic.latex, yarnverify.symbolic.plain, yarnverify.symbolic.formulas):
+    for module in (yarnverify.symbolic.latex, yarnverify.symbolic.plain, yarnverify.symbolic.grammar):
         assert doctest.testmod(module).failed == 0 < doctest.testmod(module).attempted

@@ -130,6 +130,20 @@ def time_left() -> Iterator[Callable[[str, float], None]]:
 
 
 @app.command
+def init(folder: Path, /) -> None:
+    """A small working start for energies and a document of your own.
+
+    Parameters
+    ----------
+    folder
+        A new folder; nothing is overwritten.
+    """
+    from yarnverify.init import init as start
+
+    print("\n".join(start(folder)))
+
+
+@app.command
 def prove(
     document: Path | None = None,
     /,
@@ -417,8 +431,8 @@ def check(
         module:function, file.py:function, a module or file with functions energy, gradient or force, hessian or jacobian;
         or library.so:function with the C interface that README.md describes.
     """
-    from yarnverify.check.command import Options, write_states
     from yarnverify.check.command import check as checked
+    from yarnverify.check.setting import Options, write_states
     from yarnverify.check.show import record, show
 
     options = Options(

@@ -4,7 +4,7 @@ In the order of work::
 
     tree, functions             the typed expression tree; the functions that formulas may use
     latex, plain                its ways back to LaTeX and to text
-    tokens, formulas, reader    LaTeX text -> trees with positions                 (grammar.lark)
+    tokens, grammar, reader     LaTeX text -> trees with positions                 (grammar.lark)
     declare                     energies as a person declares them in derivations/*.py
     sections, document          trees -> definitions, assumptions, energies and claims per section
     polynomials, square_roots,  reading 1: exact normal forms and derivatives      (FLINT's polynomials)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from yarnverify.source import Source
-from yarnverify.symbolic.formulas import check_braces, parse, read_formula
+from yarnverify.symbolic.grammar import check_braces, parse, read_formula
 from yarnverify.symbolic.tree import Expr
 
 EQUATION_NUMBER = re.compile(
