@@ -132,6 +132,11 @@ class Expr:
     def _joined(self, op: str) -> tuple[Expr, ...]:
         return self.args if self.op == op else (self,)
 
+    def _repr_latex_(self) -> str:
+        from yarnverify.symbolic.latex import latex
+
+        return f"$\\displaystyle {latex(self)}$"
+
     @property
     def T(self) -> Expr:
         """Transpose."""
