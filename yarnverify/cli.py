@@ -130,6 +130,20 @@ def time_left() -> Iterator[Callable[[str, float], None]]:
 
 
 @app.command
+def init(folder: Path, /) -> None:
+    """A small working start for energies and a document of your own.
+
+    Parameters
+    ----------
+    folder
+        A new folder; nothing is overwritten.
+    """
+    from yarnverify.init import init as start
+
+    print("\n".join(start(folder)))
+
+
+@app.command
 def prove(
     document: Path | None = None,
     /,
