@@ -123,6 +123,21 @@ def bending_transposed(q: Any, k_b: Any) -> Any:
     return e, g, h
 
 
+def stretch_without_projection(q: Any, k_s: Any) -> Any:
+    """The second term of the Jacobian alone."""
+    e, g, h = _of(stretch, q, k_s=k_s)
+    h[3:6, 3:6] = (k_s / (q[7] - q[6])) * np.eye(3)[:, :, None]
+    return e, g, h
+
+
+def bending_sign_of_a_term(q: Any, k_b: Any) -> Any:
+    e, g, h = _of(bending, q, k_b=k_b)
+    with np.errstate(all="ignore"):
+        d = (q[3:6] - q[:3]) / np.sqrt(((q[3:6] - q[:3]) ** 2).sum(axis=0))
+        h[3:6, 3:6] -= 2 * d[:, None] * g[None, 3:6]  # as if of d_1 d_2^T P_1
+    return e, g, h
+
+
 def bending_swapped(q: Any, k_b: Any) -> Any:
     e, g, h = _of(bending, q, k_b=k_b)
     g[3:9] = np.concatenate([g[6:9], g[3:6]])

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from yarnverify.check.command import Checked, Options, check, write_states
+from yarnverify.check.command import Checked, check
+from yarnverify.check.setting import Options, write_states
 from yarnverify.check.show import grouped, record
 from yarnverify.cli import app
 from yarnverify.errors import InputError, NotRunError
@@ -92,6 +93,8 @@ def test_single_precision_is_held_to_its_own_unit() -> None:
         ("bending_without_length", "wrong: H[x1,x1]: lacks a factor 1/|x1 - x0|"),
         ("bending_angle_unsquared", "wrong: G[u1] G[u2]: lacks a factor angle"),
         ("bending_transposed", "wrong: H[x1,x2]: is transposed"),
+        ("stretch_without_projection", "wrong: H[x1,x1]: is off by a multiple of P_1: that term is wrong, or missing"),
+        ("bending_sign_of_a_term", "wrong: H[x1,x1]: is off by a multiple of d_1 d_2^T P_1: that term is wrong"),
         ("bending_swapped", "wrong: G[x1]: is the block x2: indices are swapped"),
         ("bending_left_out", "wrong: H[u1,u1]: is zero, as if left out"),
         ("shear_gauss_newton", "holds first derivatives only (Gauss-Newton)"),

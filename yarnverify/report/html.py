@@ -16,6 +16,7 @@ from yarnverify.report.analysis import analysis_tables, fabric_line
 from yarnverify.report.benchmark import tables, where
 from yarnverify.report.mathml import compared, formula
 from yarnverify.report.pages import mistakes
+from yarnverify.report.scenes import overview, scenes
 from yarnverify.report.svg import inline
 
 _FOLDER = Path(__file__).parent
@@ -27,12 +28,20 @@ _PARTS = (  # anchor and heading, in reading order
     ("equations", "Every equation"),
     ("accuracy", "Accuracy"),
     ("speed", "Speed"),
+    ("scenes", "Scenes"),
     ("analysis", "Analysis"),
     ("commands", "How to get these numbers again"),
 )
 
 
-def page(records: dict[str, Any], pictures: Mapping[str, str], name: str = "") -> str:
+def page(
+    records: dict[str, Any],
+    pictures: Mapping[str, str],
+    name: str = "",
+    *,
+    photos: Mapping[str, bytes] | None = None,
+    turned: Mapping[str, str] | None = None,
+) -> str:
     """The whole report.
 
     Parameters
@@ -43,8 +52,11 @@ def page(records: dict[str, Any], pictures: Mapping[str, str], name: str = "") -
         Name without suffix to SVG text, of those that were drawn.
     name
         What the command line calls the folder that it is about; empty for the one that comes with the package.
+    photos, turned
+        Name of a scene to its picture as PNG, and to the page that shows it in three dimensions.
     """
-    found, derived, analysis = records["verdicts"], records["derivations"], records.get("analysis")
+    found, derived = records["verdicts"], records["derivations"]
+    analysis, simulation = records.get("analysis"), records.get("simulation")
     templates = Environment(
         loader=FileSystemLoader(_FOLDER / "templates" / "page"),
         undefined=StrictUndefined,
@@ -54,10 +66,11 @@ def page(records: dict[str, Any], pictures: Mapping[str, str], name: str = "") -
     )
     templates.filters["math"] = lambda latex: Markup(formula(latex))
     templates.filters["powers"] = _powers
+    templates.filters["capitalize_first"] = lambda text: text[:1].upper() + text[1:]
     templates.globals.update(sign=_SIGN, worst_verdict=_worst, where=where)
     templates.globals.update(argument=f" {name}" if name else "", prefix=f"{name}/" if name else "")
     return templates.get_template("report.html.jinja").render(
-        parts=_PARTS,
+        parts=[part for part in _PARTS if not (name and part[0] in ("scenes", "analysis"))],
         style=Markup((_FOLDER / "templates" / "page" / "report.css").read_text(encoding="utf-8")),
         font=b64encode((_FOLDER / "fonts" / "stix-two-math.woff2").read_bytes()).decode(),
         found=found,
@@ -69,6 +82,11 @@ def page(records: dict[str, Any], pictures: Mapping[str, str], name: str = "") -
         analysed=analysis_tables(analysis) if analysis else [],
         fabric=fabric_line(analysis) if analysis else "",
         benchmark=records.get("benchmark"),
+        simulation=simulation,
+        scenes=scenes(simulation),
+        overview=overview(simulation) if simulation else None,
+        photos={scene: b64encode(data).decode() for scene, data in (photos or {}).items()},
+        turned=turned or {},
         errors={name: _errors(records.get("accuracy"), name) for name in derived},
         hardest={name: _hardest(records.get("accuracy"), name) for name in derived},
         speeds={name: _speeds(records.get("benchmark"), name) for name in derived},
@@ -142,5 +160,10 @@ _ALT = {
 
 def _drawn(text: str, name: str) -> Markup:
     energy, _, what = name.rpartition("-")
+    if what == "precision":
+        alt = (
+            f"Relative error over seconds, for every way to solve {energy.replace('_', ' ')}; the table above has both."
+        )
+        return Markup(inline(text, name, alt))
     alt = _ALT.get(name) or _ALT.get(what, name.replace("-", " ")).format(energy)
     return Markup(inline(text, name, alt))

@@ -12,6 +12,13 @@ from yarnverify.symbolic.measures import Measure, NoMeasuresError, Segment, scal
 from yarnverify.symbolic.tree import Expr, Name
 
 
+class exponential(sp.Function):  # type: ignore[misc]
+    """An exponential that SymPy does not open: ``exp(a + b)`` stays what it is."""
+
+    def fdiff(self, argindex: int = 1) -> Any:
+        return self
+
+
 class Law:
     """Reads an expanded energy tree as a law of measures."""
 
@@ -57,7 +64,9 @@ class Law:
                     return self.scalar(plain)
                 if expr.value == "arccos":
                     return self._angle(args[0])
-                function = {"sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "log": sp.log, "exp": sp.exp}[str(expr.value)]
+                function = {"sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "log": sp.log, "exp": exponential}[
+                    str(expr.value)
+                ]
                 return function(self.scalar(args[0]))
         raise NoMeasuresError
 

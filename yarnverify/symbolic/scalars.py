@@ -53,8 +53,9 @@ def scalar_tree(value: Any, order: Order = by_index) -> Expr:
             return _product([whole, Expr("sqrt", (scalar_tree(value.base, order),))])
         if value.exp.is_Integer:
             return Expr("pow", (scalar_tree(value.base, order),), int(value.exp))
-    if isinstance(value, sp.sin | sp.cos | sp.tan | sp.log | sp.exp):
-        return Expr("call", (scalar_tree(value.args[0], order),), type(value).__name__)
+    name = type(value).__name__
+    if isinstance(value, sp.sin | sp.cos | sp.tan | sp.log) or name == "exponential":
+        return Expr("call", (scalar_tree(value.args[0], order),), "exp" if name == "exponential" else name)
     if isinstance(value, sp.sign):
         return scalar_tree(value.args[0], order) / Expr("abs", (scalar_tree(value.args[0], order),))
     if isinstance(value, sp.Abs):

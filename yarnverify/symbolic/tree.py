@@ -50,6 +50,17 @@ class Name:
 
 
 @dataclass(frozen=True, slots=True)
+class Inequality:
+    """``left > right``, as a declared domain states it."""
+
+    left: Expr
+    right: Expr
+
+    def __bool__(self) -> bool:
+        raise TypeError("write a chain such as a > b > c, or a and b, as a list: [a > b, b > c]")
+
+
+@dataclass(frozen=True, slots=True)
 class Expr:
     """A node: an operation, its arguments in printed order, and its place in the source.
 
@@ -110,6 +121,12 @@ class Expr:
 
     def __neg__(self) -> Expr:
         return Expr("neg", (self,))
+
+    def __lt__(self, other: Expr | int) -> Inequality:
+        return Inequality(as_expr(other), self)
+
+    def __gt__(self, other: Expr | int) -> Inequality:
+        return Inequality(self, as_expr(other))
 
     def _joined(self, op: str) -> tuple[Expr, ...]:
         return self.args if self.op == op else (self,)
