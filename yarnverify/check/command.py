@@ -88,7 +88,9 @@ def check(
         Where it could not be run here.
     """
     if sum(given is not None for given in (target, command, outputs)) != 1:
-        raise InputError("give one of: a target, --command, --outputs")
+        raise InputError(
+            "give one of: a target (mine.py:function, module:function, libmine.so:function), --command, --outputs"
+        )
     setting = Setting(energy_of(target or command, options), options)
     values = setting.values()
     q = setting.states(values)
