@@ -122,7 +122,7 @@ def _judged(
         if diagnosis.status in ("wrong", "approximate"):
             block = narrowed(block, cases, judge.plain & ~np.isinf(block.errors))  # the plainest state shows it best
         found.append((block, diagnosis))
-        advance("judging", len(blocks))
+        advance("judging", len(cases) + len(blocks))
     checked = Checked(name, cases, convention, found, notes=notes, extra={k: v for k, v in results.extra.items() if v})
     checked.left = ran.left
     checked.troubles = _troubles(ran, cases)
