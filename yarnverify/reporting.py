@@ -15,12 +15,13 @@ from yarnverify.project import Project, project
 from yarnverify.show import mistake_lines, tally_lines
 from yarnverify.verdicts import nothing_printed, verdicts
 
-MEASURED = ("accuracy", "benchmark", "analysis")  # records that commands of their own write
+MEASURED = ("accuracy", "benchmark", "analysis", "simulation")  # records that commands of their own write
 
 COMMANDS = {
     "accuracy": "yarnverify accuracy --write",
     "benchmark": "yarnverify benchmark --json reports/records/benchmark.json",
     "analysis": "yarnverify analyse --write",
+    "simulation": "yarnverify simulate --write",
 }
 
 
@@ -93,6 +94,7 @@ def _draw(folder: Path, measured: dict[str, Any], energies: list[str], lines: li
     try:
         from yarnverify.report.analysis_pictures import PICTURES
         from yarnverify.report.pictures import error_against_angle, speed_against_error, write
+        from yarnverify.report.precision import precision
     except ImportError:
         raise NotRunError("pictures need matplotlib: pip install 'yarnverify[view]'") from None
 
@@ -112,6 +114,11 @@ def _draw(folder: Path, measured: dict[str, Any], energies: list[str], lines: li
         for name, draw in PICTURES.items():
             write(partial(draw, measured["analysis"]), folder / name)
             lines.append(f"pictures/{name}: drawn")
+    if measured["simulation"] is not None:
+        for scene in measured["simulation"]["scenes"]:
+            name, timed = scene["scene"], measured["simulation"]["timings"]["scenes"]
+            write(partial(precision, scene, timed[name]), folder / f"{name}-precision")
+            lines.append(f"pictures/{name}-precision: drawn")
 
 
 def _measured(out: Path) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from yarnverify.report.analysis import analysis_tables, fabric_line
 from yarnverify.report.benchmark import tables, where
 from yarnverify.report.mathml import compared, formula
 from yarnverify.report.pages import mistakes
+from yarnverify.report.simulation import frugality, summary
 from yarnverify.report.svg import inline
 
 _FOLDER = Path(__file__).parent
@@ -28,6 +29,7 @@ _PARTS = (  # anchor and heading, in reading order
     ("accuracy", "Accuracy"),
     ("speed", "Speed"),
     ("analysis", "Analysis"),
+    ("simulation", "Simulations"),
     ("commands", "How to get these numbers again"),
 )
 
@@ -45,6 +47,7 @@ def page(records: dict[str, Any], pictures: Mapping[str, str], name: str = "") -
         What the command line calls the folder that it is about; empty for the one that comes with the package.
     """
     found, derived, analysis = records["verdicts"], records["derivations"], records.get("analysis")
+    simulation = records.get("simulation")
     templates = Environment(
         loader=FileSystemLoader(_FOLDER / "templates" / "page"),
         undefined=StrictUndefined,
@@ -66,6 +69,8 @@ def page(records: dict[str, Any], pictures: Mapping[str, str], name: str = "") -
         mistakes=[{**claim, "marked": _marked(claim)} for claim in mistakes(found, None)],
         accuracy=records.get("accuracy"),
         analysis=analysis,
+        simulation=simulation,
+        simulated=[summary(simulation), frugality(simulation)] if simulation else [],
         analysed=analysis_tables(analysis) if analysis else [],
         fabric=fabric_line(analysis) if analysis else "",
         benchmark=records.get("benchmark"),

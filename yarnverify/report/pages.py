@@ -10,7 +10,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from yarnverify.report.accuracy import accuracy_table, kinds
 from yarnverify.report.analysis import analysis_tables, fabric_line
-from yarnverify.report.benchmark import benchmark_table
+from yarnverify.report.benchmark import benchmark_table, where
+from yarnverify.report.simulation import frugality, studies, summary
 
 _TEMPLATES = Environment(
     loader=FileSystemLoader(Path(__file__).parent / "templates"),
@@ -30,7 +31,7 @@ def pages(
     ----------
     records
         ``verdicts``, ``derivations`` and ``kernels``, as written to ``records/``;
-        ``accuracy``, ``benchmark`` and ``analysis`` where measured.
+        ``accuracy``, ``benchmark``, ``analysis`` and ``simulation`` where measured.
     pictures
         Names of the pictures that are in ``pictures/``.
     source
@@ -49,6 +50,7 @@ def pages(
             mistakes=mistakes(found, None),
             place=place,
             analysed=records.get("analysis") is not None,
+            simulated=records.get("simulation") is not None,
         )
     }
     for energy, derivation in derived.items():
@@ -75,6 +77,17 @@ def pages(
             tables=analysis_tables(analysis),
             fabric=fabric_line(analysis),
             command=analysis["command"],
+            pictures=pictures,
+        )
+    simulation = records.get("simulation")
+    if simulation is not None:
+        texts["simulation.md"] = _render(
+            "simulation.md.jinja",
+            record=simulation,
+            where=where(simulation["timings"]),
+            summary=summary(simulation),
+            frugality=frugality(simulation),
+            studies={scene["scene"]: studies(simulation, scene) for scene in simulation["scenes"]},
             pictures=pictures,
         )
     return dict(sorted(texts.items()))
