@@ -63,6 +63,19 @@ def stretch_by_radius(q: Any, Y: Any, R: Any) -> Any:
     return _of(stretch, q, k_s=Y * np.pi * R**2)
 
 
+def stretch_sliding_forces(x0: Any, x1: Any, u0: float, u1: float, ks: float) -> Any:
+    """Two numbers, one a sliding coordinate."""
+    force = 0.5 * ks * (np.sum((x1 - x0) ** 2) / (u1 - u0) ** 2 - 1)
+    return -force, force
+
+
+def bending_of_a_chain(x0: Any, x1: Any, x2: Any, u1: float, u2: float, k_b: float) -> Any:
+    """Points in the order of the yarn: the middle one comes second."""
+    e, g, h = _of(bending, np.concatenate([x1, x0, x2, [u1, u2]])[:, None], k_b=k_b)
+    mine = [3, 4, 5, 0, 1, 2, 6, 7, 8, 9, 10]
+    return float(e[0]), g[mine, 0], h[np.ix_(mine, mine)][..., 0]
+
+
 # -- mistakes ---------------------------------------------------------------------------------------------------------
 
 
@@ -110,6 +123,21 @@ def bending_transposed(q: Any, k_b: Any) -> Any:
     return e, g, h
 
 
+def stretch_without_projection(q: Any, k_s: Any) -> Any:
+    """The second term of the Jacobian alone."""
+    e, g, h = _of(stretch, q, k_s=k_s)
+    h[3:6, 3:6] = (k_s / (q[7] - q[6])) * np.eye(3)[:, :, None]
+    return e, g, h
+
+
+def bending_sign_of_a_term(q: Any, k_b: Any) -> Any:
+    e, g, h = _of(bending, q, k_b=k_b)
+    with np.errstate(all="ignore"):
+        d = (q[3:6] - q[:3]) / np.sqrt(((q[3:6] - q[:3]) ** 2).sum(axis=0))
+        h[3:6, 3:6] -= 2 * d[:, None] * g[None, 3:6]  # as if of d_1 d_2^T P_1
+    return e, g, h
+
+
 def bending_swapped(q: Any, k_b: Any) -> Any:
     e, g, h = _of(bending, q, k_b=k_b)
     g[3:9] = np.concatenate([g[6:9], g[3:6]])
@@ -148,6 +176,14 @@ def shear_rounded_pi(q: Any, k_x: Any, L: Any) -> Any:
     a, b = q[3:6] - q[:3], q[6:9] - q[:3]
     phi = np.arctan2(np.sqrt((np.cross(a, b, axis=0) ** 2).sum(axis=0)), (a * b).sum(axis=0))
     return {"gradient": g * (phi - 1.57) / (phi - np.pi / 2)}
+
+
+def shear_without_lengths(x0: Any, x1: Any, x3: Any) -> Any:
+    """A right angle in three digits, no lengths, and a cross product that is not of length one."""
+    a, b = (x1 - x0) / np.linalg.norm(x1 - x0), (x3 - x0) / np.linalg.norm(x3 - x0)
+    size = -120 * (np.arccos(np.clip(a @ b, -1, 1)) - 1.57)
+    c = np.cross(a, b)
+    return np.cross(a, c) * size, np.cross(c, b) * size
 
 
 def bending_single_inside(q: Any, k_b: Any) -> Any:

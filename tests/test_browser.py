@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.pages import whole_page
+from tests.pages import drawn, whole_page
 
 api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed (extra: browser)")
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed (extra: browser)")
@@ -30,7 +30,10 @@ def browser() -> Iterator[Any]:
     if found is None:
         pytest.skip("no Chromium is installed (on Debian: apt install chromium)")
     with api.sync_playwright() as started:
-        opened = started.chromium.launch(executable_path=found, args=["--no-sandbox"])
+        opened = started.chromium.launch(
+            executable_path=found,
+            args=["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+        )
         yield opened
         opened.close()
 
@@ -38,7 +41,7 @@ def browser() -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.html"
-    path.write_text(whole_page(), encoding="utf-8")
+    path.write_text(whole_page(**drawn(path.parent)), encoding="utf-8")
     return path
 
 
@@ -79,7 +82,7 @@ def test_it_fits_the_screen(opened: tuple[str, Any, list[str]]) -> None:
 
 
 def test_accessible(opened: tuple[str, Any, list[str]]) -> None:
-    """Contrast, names, alternative texts, headings, landmarks, tables: all rules of axe for WCAG 2.2 AA and good practice."""
+    """Contrast, names, alternative texts, headings, landmarks, tables, sizes of targets, by axe."""
     name, page, _ = opened
     page.evaluate(_THINNED)
     only = {} if name == "desktop" else {"runOnly": ["color-contrast", "target-size", "scrollable-region-focusable"]}
@@ -103,6 +106,28 @@ def test_formulas_are_set_in_the_font_that_comes_along(opened: tuple[str, Any, l
     high = opened[1].evaluate("document.querySelector('#equation-2 mfrac').getBoundingClientRect().height")
     line = opened[1].evaluate("document.querySelector('#equation-1 msub').getBoundingClientRect().height")
     assert high > 1.5 * line  # a fraction is set as one
+
+
+def test_a_scene_can_be_turned(opened: tuple[str, Any, list[str]]) -> None:
+    page = opened[1]
+    page.locator("details:has(iframe) > summary").click()
+    frame = page.locator("iframe.turned")
+    frame.scroll_into_view_if_needed()
+    inside = page.frame_locator("iframe.turned")
+    inside.locator("#title", has_text="a small cloth").wait_for()
+    if inside.locator("#failed").is_visible():
+        pytest.skip("this Chromium has no WebGL 2")
+    inside.locator("#legend", has_text="warp").wait_for()
+    before = frame.screenshot()
+    box = frame.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 80, y + 30, steps=4)
+    page.mouse.up()
+    assert frame.screenshot() != before
+    assert opened[2] == []
+    page.reload()
 
 
 def test_readable_without_scripts_and_on_paper(browser: Any, file: Path) -> None:

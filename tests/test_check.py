@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from yarnverify.check.command import Checked, Options, check, write_states
+from yarnverify.check.command import Checked, check
+from yarnverify.check.setting import Options, write_states
 from yarnverify.check.show import grouped, record
 from yarnverify.cli import app
 from yarnverify.errors import InputError, NotRunError
@@ -63,6 +64,11 @@ def test_kernels_of_the_package_pass(energy: str, variant: str) -> None:
         ("bending_force_unsaid", {"returns": ("_", "force", "hessian")}),
         ("stretch_by_radius", {"given": ("R=0.25", "Y=k_s/(pi*R**2)")}),
         ("bending_without_stiffness", {"fix": ("k_b=1",)}),
+        (
+            "stretch_sliding_forces",
+            {"returns": ("u0", "u1"), "force": True, "regimes": ("moderate", "sliding", "ratios")},
+        ),
+        ("bending_of_a_chain", {"order": "x1,x0,x2,u1,u2", "given": ("x0=x1", "x1=x0")}),
     ],
 )
 def test_right_ones_pass_in_every_manner(name: str, options: dict[str, Any]) -> None:
@@ -87,6 +93,8 @@ def test_single_precision_is_held_to_its_own_unit() -> None:
         ("bending_without_length", "wrong: H[x1,x1]: lacks a factor 1/|x1 - x0|"),
         ("bending_angle_unsquared", "wrong: G[u1] G[u2]: lacks a factor angle"),
         ("bending_transposed", "wrong: H[x1,x2]: is transposed"),
+        ("stretch_without_projection", "wrong: H[x1,x1]: is off by a multiple of P_1: that term is wrong, or missing"),
+        ("bending_sign_of_a_term", "wrong: H[x1,x1]: is off by a multiple of d_1 d_2^T P_1: that term is wrong"),
         ("bending_swapped", "wrong: G[x1]: is the block x2: indices are swapped"),
         ("bending_left_out", "wrong: H[u1,u1]: is zero, as if left out"),
         ("shear_gauss_newton", "holds first derivatives only (Gauss-Newton)"),
@@ -125,6 +133,20 @@ def test_another_convention_is_found(name: str, options: dict[str, Any], hint: s
     found = checked(name, **options)
     assert not found.passes
     assert any(hint in text for text in found.hints), (found.hints, said(found))
+
+
+def test_two_mistakes_in_one_block() -> None:
+    options = {"force": True, "returns": ("x1", "x3"), "fix": ("k_x=120", "L=1"), "regimes": ("moderate",)}
+    text = said(checked("shear_without_lengths", **options))
+    assert "wrong: G[x1]: takes 1.57 for pi/2, and lacks a factor 1/(|x1 - x0| sin(angle))" in text
+    assert "wrong: G[x3]: takes 1.57 for pi/2, and lacks a factor 1/(|x3 - x0| sin(angle))" in text
+
+
+def test_other_names_are_found() -> None:
+    (hint,) = checked("bending_of_a_chain").hints
+    words = hint.split()
+    given = tuple(words[i + 1] for i, word in enumerate(words) if word == "--with")
+    assert checked("bending_of_a_chain", order=words[words.index("--order") + 1], given=given).passes
 
 
 def test_another_order_is_found() -> None:

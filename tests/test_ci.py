@@ -109,6 +109,33 @@ def test_a_file_that_cannot_be_written_is_named(found: dict[str, Any], tmp_path:
         ci.write(found, "d.md", tmp_path / "none" / "j.xml", None)
 
 
+def test_a_report_tells_of_files_that_differ(found: dict[str, Any]) -> None:
+    good = ci.of_report(found, {"as_expected": True, "as_generated": True})
+    assert fromstring(ci.junit(good, "d.md")).get("failures") == "0"
+    bad = ci.of_report(found, {"as_expected": True, "as_generated": False})
+    assert [case.name for case in ci.cases(bad) if case.result == "failure"] == ["files are as generated"]
+    assert ci.summary(bad, "d.md").startswith("### ❌")
+    assert "::error file=d.md,line=1,col=1,title=files are as generated::" in "\n".join(
+        ci.workflow_commands(bad, "d.md")
+    )
+
+
+def test_report_writes_what_was_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "d.md").write_text("## A\n\n$$V = k u_1^2 \\quad (1)$$\n\n$$F_{u_1} = k u_1 \\quad (2)$$\n")
+    monkeypatch.chdir(tmp_path)
+    status = run(["report", "own", "--junit", "j.xml", "--summary", "s.md"], monkeypatch)
+    assert status == 1
+    failed = [
+        case
+        for case in fromstring((tmp_path / "j.xml").read_text()).iter("testcase")
+        if case.find("failure") is not None
+    ]
+    assert "(2) F_u1" in {case.get("name") for case in failed}
+    assert {case.get("file") for case in failed} == {"own/d.md"}
+    assert "| (2) F_u1 | own/d.md:5 |" in (tmp_path / "s.md").read_text()
+
+
 def run(tokens: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
     monkeypatch.setattr("sys.argv", ["yarnverify", *tokens])
     with pytest.raises(SystemExit) as stopped:

@@ -24,7 +24,7 @@ def load(folder: Path, text: str, name: str = "spring.py", head: str = HEAD) -> 
 
 SPRING = """
 @energy(document="d.md", section="Spring", unit="J", domain=r"u_1 > u_0 > 0")
-def spring(x_1: Point, u0: Sliding, u1: Sliding, *, k_s: Positive["N"], a: Real["rad"]):
+def spring(x_1: Point, u0: Sliding, u1: Sliding, *, k_s: Positive["N m^-1"], a: Real["J"]):
     '''Half the stiffness
     times the square.'''
     return k_s * (u1 - u0) ** 2 / 2 + a
@@ -36,18 +36,18 @@ def test_a_declared_energy(tmp_path: Path) -> None:
     assert (found.name, found.document, found.section, found.unit) == ("spring", "d.md", "Spring", "J")
     assert found.summary == "Half the stiffness\ntimes the square."
     assert found.unknowns == (Name("x", "1", True), Name("u", "0"), Name("u", "1"))
-    assert [(str(p.name), p.unit, p.positive) for p in found.parameters] == [("k_s", "N", True), ("a", "rad", False)]
+    assert [(str(p.name), p.unit, p.positive) for p in found.parameters] == [("k_s", "N m^-1", True), ("a", "J", False)]
     assert found.expression == read_formula(r"\frac{k_s (u_1 - u_0)^2}{2} + a")
     assert len(found.domain) == 3
 
 
 def test_a_declared_quantity_is_also_a_function(tmp_path: Path) -> None:
     text = '@quantity(document="d.md", symbol=r"l_i")\ndef l_i(x_i: Point, x_0: Point):\n    return length(x_i - x_0)\n'
-    use = "@energy()\ndef e(x1: Point, x2: Point):\n    return 1 - 2 * l_i(x1, x2) / 3\n"
+    use = "@energy(unit='m')\ndef e(x1: Point, x2: Point):\n    return -2 * l_i(x1, x2) / 3\n"
     found = load(tmp_path, text + use)
     assert found.quantities[0].symbol == Name("l", "i")
     assert found.quantities[0].expression == read_formula(r"\|\mathbf{x}_i - \mathbf{x}_0\|")
-    assert latex(found.energies[0].expression) == r"1 - \frac{2 \|\mathbf{x}_1 - \mathbf{x}_2\|}{3}"
+    assert latex(found.energies[0].expression) == r"\frac{\left( -2 \right) \|\mathbf{x}_1 - \mathbf{x}_2\|}{3}"
 
 
 def test_an_energy_under_two_names_is_declared_once(tmp_path: Path) -> None:
@@ -67,13 +67,13 @@ def test_a_folder_without_python_files_declares_nothing(tmp_path: Path) -> None:
 
 # file text after the import in line 1, line of the error, words of the message
 BAD = {
-    "unknown without annotation": ("@energy()\ndef e(x1):\n    return x1\n", 2, "'x1' of e must be annotated Point"),
-    "parameter without annotation": ("@energy()\ndef e(u1: Sliding, *, k):\n    return k\n", 2, "'k' of e must be annotated"),
-    "vector without unit": ("@energy()\ndef e(u1: Sliding, *, g: Vector):\n    return g\n", 2, "'g' of e must be annotated"),
+    "unknown without annotation": ("@energy()\ndef e(x1):\n    return x1\n", 3, "'x1' of e must be annotated Point"),
+    "parameter without annotation": ("@energy()\ndef e(u1: Sliding, *, k):\n    return k\n", 3, "'k' of e must be annotated"),
+    "vector without unit": ("@energy()\ndef e(u1: Sliding, *, g: Vector):\n    return g\n", 3, "'g' of e must be annotated"),
     "no such rate": (
-        "@energy()\ndef e(u1: Sliding):\n    return u1\n@unchanged_by(e)\ndef m():\n    return {'u7': 1}\n", 5, "no unknown u7",
+        "@energy()\ndef e(u1: Sliding):\n    return u1\n@unchanged_by(e)\ndef m():\n    return {'u7': 1}\n", 7, "no unknown u7",
     ),
-    "unit left out": ("@energy()\ndef e(u1: Sliding, *, k: Positive):\n    return k\n", 2, "'k' of e must be annotated"),
+    "unit left out": ("@energy()\ndef e(u1: Sliding, *, k: Positive):\n    return k\n", 3, "'k' of e must be annotated"),
     "syntax error": ("def e(:\n", 2, "invalid syntax"),
     "wrong indentation": ("def e():\nreturn 1\n", 3, "expected an indented block"),
     "float factor": ("@energy()\ndef e(u1: Sliding):\n    return 0.5 * u1\n", 4, "0.5 cannot stand in a formula"),
@@ -84,14 +84,14 @@ BAD = {
     "unknown name": ("@energy()\ndef e(u1: Sliding):\n    return u2\n", 4, "name 'u2' is not defined"),
     "unknown option": ('@energy(units="J")\ndef e(u1: Sliding):\n    return u1\n', 2, "unexpected keyword argument 'units'"),
     "missing module": ("import no_such_module\n", 2, "no_such_module"),
-    "nothing returned": ("@energy()\ndef e(u1: Sliding):\n    u1 ** 2\n", 2, "e"),
-    "text returned": ("@energy()\ndef e(u1: Sliding):\n    return 'u1'\n", 2, "e"),
+    "nothing returned": ("@energy()\ndef e(u1: Sliding):\n    u1 ** 2\n", 3, "e"),
+    "text returned": ("@energy()\ndef e(u1: Sliding):\n    return 'u1'\n", 4, "e"),
     "bad domain": ('@energy(domain=r"u_1 > \\foo")\ndef e(u1: Sliding):\n    return u1\n', 2, r"unknown LaTeX command \foo"),
     "bad symbol": ('@quantity(symbol=r"\\foo")\ndef e(u1: Sliding):\n    return u1\n', 2, r"unknown LaTeX command \foo"),
     "symbol that is a sum": ('@quantity(symbol=r"a + b")\ndef e(u1: Sliding):\n    return u1\n', 2, "symbol"),
     "two symbols": ('@quantity(symbol=r"a, b")\ndef e(u1: Sliding):\n    return u1\n', 2, "symbol"),
-    "shapes": ("@energy()\ndef e(x1: Point, u1: Sliding):\n    return x1 + u1\n", 2, "cannot add"),
-    "vector energy": ("@energy()\ndef e(x1: Point):\n    return x1\n", 2, "scalar"),
+    "shapes": ("@energy()\ndef e(x1: Point, u1: Sliding):\n    return x1 + u1\n", 4, "cannot add"),
+    "vector energy": ("@energy()\ndef e(x1: Point):\n    return x1\n", 4, "scalar"),
 }  # fmt: skip
 
 

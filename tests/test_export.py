@@ -14,7 +14,8 @@ import pytest
 from scipy.io import loadmat
 
 from yarnverify.check.cases import hard_cases
-from yarnverify.check.command import Options, check
+from yarnverify.check.command import check
+from yarnverify.check.setting import Options
 from yarnverify.cli import app
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.export.command import export
@@ -92,6 +93,17 @@ def test_every_file_says_the_same(exported: Path, energy: str) -> None:
     known = ~np.isnan(stored["condition_energy"])
     assert np.array_equal(known, cases.truth.has_derivatives) and known.any()
     assert not np.isnan(stored["condition_hessian"][known]).any()
+
+
+@needs_compiler
+def test_an_energy_of_another_paper(tmp_path: Path) -> None:
+    rod = derivations() / "rod"
+    export("spring", tmp_path, rod, 2, False)
+    build(tmp_path, "spring_test.c", "spring.c", "-o", "spring_test")
+    assert subprocess.run([tmp_path / "spring_test"], capture_output=True).returncode == 0
+    build(tmp_path, "-shared", "-fPIC", "spring.c", "-o", "libspring.so")
+    assert check(f"{tmp_path}/libspring.so:spring", Options(count=2, derivations=rod)).passes
+    assert r"\tag{1}" in (tmp_path / "spring.tex").read_text()
 
 
 def numbers(value: Any) -> Any:

@@ -13,10 +13,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from yarnverify.symbolic.algebraic import Algebraic, UndefinedError, approximate
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.forward import Evaluation, entries
 from yarnverify.symbolic.jets import Jet
-from yarnverify.symbolic.numbers import Algebraic, Balls, Floats, Rationals, UndefinedError
+from yarnverify.symbolic.numbers import Balls, Floats, Rationals
 from yarnverify.symbolic.reader import read_formula
 from yarnverify.symbolic.states import StateMaker
 from yarnverify.symbolic.tree import Expr, Name
@@ -59,7 +60,6 @@ def test_numbers_with_roots_are_a_field(p: Any, q: Any, r: Any, d: Any) -> None:
 @settings(max_examples=60)
 @given(algebraics, invertible)
 def test_numbers_with_roots_agree_with_balls(p: Any, q: Any) -> None:
-    approximate = NUMBERS._approximate
     assert approximate(p * q + p / q).overlaps(approximate(p) * approximate(q) + approximate(p) / approximate(q))
     assert NUMBERS.positive(q * q)
     assert NUMBERS.positive(q) != NUMBERS.positive(-q)
@@ -76,14 +76,17 @@ def test_roots_stay_independent() -> None:
     assert two != 2 and two != "two"
 
 
-def test_a_root_over_a_root_is_never_inverted_wrongly() -> None:
+def test_a_root_that_the_others_have_is_written_with_them() -> None:
     numbers = Rationals(0)
     two = numbers.sqrt(flint.fmpq(2))
-    root = numbers.sqrt(3 + 2 * two)  # = 1 + sqrt(2), which is either seen or refused, never taken for another number
-    assert root * root == 3 + 2 * two
-    if root != 1 + two:
-        with pytest.raises(UndefinedError, match="dependent"):
-            1 / (root - 1 - two)
+    three = numbers.sqrt(flint.fmpq(3))
+    assert numbers.sqrt(3 + 2 * two) == 1 + two
+    assert numbers.sqrt(3 - 2 * two) == two - 1
+    assert numbers.sqrt(5 + 2 * two * three) == two + three
+    deep = numbers.sqrt(2 + two)  # sqrt(2 + sqrt 2) sqrt(2 - sqrt 2) = sqrt 2
+    assert numbers.sqrt(2 - two) * deep == two
+    total = 1 + two + three + deep
+    assert numbers.sqrt(total * total) == total
 
 
 def test_numbers_without_a_value() -> None:

@@ -11,8 +11,9 @@ from xml.etree.ElementTree import fromstring
 
 import pytest
 
-from tests.pages import records, whole_page
+from tests.pages import records, simulated, whole_page
 from yarnverify.report.mathml import compared, formula
+from yarnverify.report.scenes import overview, scenes
 from yarnverify.report.svg import inline
 
 
@@ -86,9 +87,9 @@ def test_every_verdict_of_the_record_is_shown(text: str) -> None:
 
 def test_what_was_not_measured_says_so() -> None:
     found = {name: record for name, record in records().items() if name in ("verdicts", "derivations", "kernels")}
-    missing = {"accuracy": None, "benchmark": None, "analysis": None}
+    missing = {"accuracy": None, "benchmark": None, "analysis": None, "simulation": None}
     text = " ".join("".join(read(whole_page(found | missing)).text).split())
-    assert text.count("Not run.") == 2  # errors and analysis
+    assert text.count("Not run.") == 3  # errors, scenes and analysis
     assert "Not run: stretch, bending, shear, parallel_contact" in text
     assert "Command: yarnverify accuracy --write" in text
 
@@ -101,6 +102,31 @@ def test_text_of_a_document_is_no_markup() -> None:
     assert "<b onclick" not in text
     assert "undefined symbol &lt;b onclick=x&gt;" in text
     assert "<strong>New:</strong>" in text
+
+
+def test_scenes_show_errors_orders_and_seconds() -> None:
+    text = " ".join("".join(read(whole_page(photos={"elastica": b"PNG"})).text).split())
+    assert "A hanging yarn, stretched by its own weight" in text
+    assert "Command: yarnverify simulate elastica --out results" in text
+    runs = scenes(simulated())[1].runs
+    assert runs is not None and runs.headings[:4] == ("wall", "segments", "unknowns", "iterations")
+    assert runs.headings[-1] == "seconds" and len(runs.rows) == 4
+    assert float(runs.rows[1][5]) == pytest.approx(2, abs=0.2)
+
+
+def test_the_overview_takes_the_worst_of_what_is_judged() -> None:
+    record = copy.deepcopy(simulated())
+    answers = [line["runs"][-1]["answers"][0] for line in record["scenes"][0]["result"]["lines"]]
+    answers[0]["error"], answers[1]["error"] = 0.25, 1e-3
+    assert overview(record).rows[0][2] == "2.5e-1"
+    answers[0]["allowed"] = None
+    assert overview(record).rows[0][2] == "1.0e-3"
+
+
+def test_a_goal_that_was_missed_is_shown() -> None:
+    record = copy.deepcopy(simulated())
+    record["scenes"][0]["result"]["missed"] = ["the height is <wrong>"]
+    assert "Missed: the height is &lt;wrong&gt;" in whole_page(records() | {"simulation": record})
 
 
 # -- formulas ---------------------------------------------------------------------------------------------------------

@@ -13,11 +13,11 @@ import pytest
 
 from yarnverify.library import Shelf, errata, shelf_for
 from yarnverify.source import Source
+from yarnverify.symbolic.algebraic import UndefinedError
 from yarnverify.symbolic.court import Court, Verdict, _Comparison
 from yarnverify.symbolic.declare import Declarations
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.forward import Evaluation
-from yarnverify.symbolic.numbers import UndefinedError
 from yarnverify.symbolic.prove import read_with, try_document
 from yarnverify.symbolic.reader import read_formula
 from yarnverify.symbolic.reading import UnsupportedError
@@ -201,8 +201,8 @@ TRUE, WRONG = read_formula(r"-k (l_1 - L) \mathbf{d}_1"), read_formula(r"k (l_1 
 @pytest.mark.parametrize(
     ("route", "lie", "formula", "reason"),
     [
-        ("_equal_normal", True, WRONG, "equal as normal forms, different at an exact state"),
-        ("_equal_normal", False, TRUE, "different as normal forms, equal at every exact state tried"),
+        ("equal", True, WRONG, "equal as normal forms, different at an exact state"),
+        ("equal", False, TRUE, "different as normal forms, equal at every exact state tried"),
         ("_compare", _Comparison(3), WRONG, "different as normal forms, equal at every exact state tried"),
         ("_compare", _Comparison(3, ({},)), TRUE, "equal as normal forms, different at an exact state"),
     ],
@@ -212,9 +212,16 @@ def test_readings_that_contradict_each_other_are_inconsistent(
 ) -> None:
     if lie == _Comparison(3, ({},)):
         lie = _Comparison(3, (dict(spring.exact[0].state),))  # a state at which the sides are equal in truth
-    monkeypatch.setattr(spring, route, lambda *sides: lie, raising=False)
+    monkeypatch.setattr(spring.forms if route == "equal" else spring, route, lambda *sides: lie, raising=False)
     finding = spring.judge(FORCE, formula)
     assert (finding.verdict, finding.reason) == (Verdict.INCONSISTENT, reason)
+
+
+def test_a_proof_that_balls_do_not_bear_out_is_inconsistent(spring: Court, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spring.forms, "equal", lambda *sides: True)
+    monkeypatch.setattr(spring, "_compare", lambda *sides: _Comparison(3))
+    finding = spring.judge(FORCE, WRONG)
+    assert (finding.verdict, finding.reason) == (Verdict.INCONSISTENT, "equal in exact readings, apart in balls")
 
 
 def _raise(error: Exception) -> Any:
@@ -225,7 +232,7 @@ def _raise(error: Exception) -> Any:
 
 
 def test_what_the_normal_form_does_not_support_is_undecided(spring: Court, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(spring, "_equal_normal", _raise(UnsupportedError("too hard")))
+    monkeypatch.setattr(spring.forms, "equal", _raise(UnsupportedError("too hard")))
     finding = spring.judge(FORCE, TRUE)
     assert finding.verdict is Verdict.UNDECIDED
     assert re.fullmatch(r"too hard; equal at the \d exact states tried", finding.reason)

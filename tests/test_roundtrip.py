@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from yarnverify.source import Source
-from yarnverify.symbolic.latex import ACCENTS, FUNCTIONS, GREEK, latex, name_latex
+from yarnverify.symbolic.functions import FUNCTIONS
+from yarnverify.symbolic.latex import ACCENTS, GREEK, latex, name_latex
 from yarnverify.symbolic.reader import Heading, read, read_formula
 from yarnverify.symbolic.tree import IDENTITY, PI, Expr, Name, number, symbol
 

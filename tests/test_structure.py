@@ -156,7 +156,8 @@ def test_readme_document_is_read_and_proved(tmp_path: Path) -> None:
     path = tmp_path / "spring.md"
     path.write_text(text[1], encoding="utf-8")
     found, _ = verdicts(path, cache=False)
-    assert found["tally"]["proved"] == 2 == len(found["claims"])
+    assert found["tally"]["proved"] == 6 == len(found["claims"])
+    assert [part["verdict"] for part in found["completeness"]] == ["proved"]
 
 
 def test_doctests_of_the_package() -> None:

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from yarnverify.accuracy.forms import reduce
 from yarnverify.accuracy.truth import Points, rounded_ball, truth
 from yarnverify.errors import InputError
+from yarnverify.symbolic.algebraic import UndefinedError
 from yarnverify.symbolic.forward import Evaluation
-from yarnverify.symbolic.numbers import Balls, Rationals, UndefinedError
+from yarnverify.symbolic.numbers import Balls, Rationals
 from yarnverify.symbolic.reader import read_formula
 from yarnverify.symbolic.states import StateMaker
 

@@ -29,8 +29,27 @@ class Case:
 
 
 def cases(record: dict[str, Any]) -> list[Case]:
-    """Every claim of a record, then every list of forces and Jacobians, then the errata that are stale."""
-    return [*_claims(record), *_lists(record), *_stale(record)]
+    """Every claim of a record, then every list of forces and Jacobians, then the errata that are stale.
+
+    A record of ``yarnverify report`` says too whether its files are as generated and its derivations are proved.
+    """
+    return [*_claims(record), *_lists(record), *_stale(record), *_files(record)]
+
+
+def of_report(verdicts: dict[str, Any], report: dict[str, Any]) -> dict[str, Any]:
+    """The record of verdicts with what a report found besides."""
+    return {
+        **verdicts,
+        "as_generated": report["as_generated"],
+        "as_expected": report["as_expected"] and report["as_generated"],
+    }
+
+
+def _files(record: dict[str, Any]) -> Iterator[Case]:
+    if "as_generated" in record:
+        good = record["as_generated"]
+        message = "" if good else "files of the report differ from what the derivations and records give"
+        yield Case("report", "files are as generated", 1, 1, "passed" if good else "failure", message)
 
 
 def _claims(record: dict[str, Any]) -> Iterator[Case]:
@@ -144,6 +163,8 @@ def summary(record: dict[str, Any], path: str) -> str:
             "accepted" if claim["erratum"] else "**new**",
         )
         lines.append("| " + " | ".join(cell.replace("\\|", "\\Vert ").replace("|", "\\|") for cell in cells) + " |")
+    if not record.get("as_generated", True):
+        lines += ["", "Files of the report differ from what the derivations and records give."]
     for part in record["completeness"]:
         if part["missing"]:
             lines += ["", f"{part['section']} does not list {', '.join(item['block'] for item in part['missing'])}."]

@@ -130,6 +130,20 @@ def time_left() -> Iterator[Callable[[str, float], None]]:
 
 
 @app.command
+def init(folder: Path, /) -> None:
+    """A small working start for energies and a document of your own.
+
+    Parameters
+    ----------
+    folder
+        A new folder; nothing is overwritten.
+    """
+    from yarnverify.init import init as start
+
+    print("\n".join(start(folder)))
+
+
+@app.command
 def prove(
     document: Path | None = None,
     /,
@@ -328,6 +342,9 @@ def report(
         bool, Parameter(negative="", help="Draw the pictures of measured records (needs matplotlib).")
     ] = False,
     json_file: Json = None,
+    junit: Junit = None,
+    summary: Summary = None,
+    annotations: Annotations = False,
 ) -> None:
     """All of it, to reports/: verdicts, corrections, derivations, kernels, and what was measured; a page an energy.
 
@@ -337,11 +354,17 @@ def report(
         Folder with energies, and perhaps a document, of your own: its kernels are written to FOLDER/kernels and measured.
         The paper's by default.
     """
+    from yarnverify import ci
     from yarnverify.project import project
     from yarnverify.reporting import build_report
 
+    of = project(folder)
     with progress("reporting") as advance:
-        outcome = build_report(out, check, advance, pictures, project(folder))
+        outcome = build_report(out, check, advance, pictures, of)
+    path, found = ci.shown_path(of.folder / of.document), ci.of_report(outcome.verdicts, outcome.record)
+    ci.write(found, path, junit, summary)
+    if annotations:
+        outcome.lines += ci.workflow_commands(found, path)
     _finish(outcome, json_file)
 
 
@@ -408,8 +431,8 @@ def check(
         module:function, file.py:function, a module or file with functions energy, gradient or force, hessian or jacobian;
         or library.so:function with the C interface that README.md describes.
     """
-    from yarnverify.check.command import Options, write_states
     from yarnverify.check.command import check as checked
+    from yarnverify.check.setting import Options, write_states
     from yarnverify.check.show import record, show
 
     options = Options(

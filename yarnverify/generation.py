@@ -20,11 +20,12 @@ WRITTEN_BY_HAND = {
 
 @dataclass
 class Outcome:
-    """What a command that writes or compares files did."""
+    """What a command that writes or compares files did; for a report, with the verdicts behind it."""
 
     record: dict[str, Any] = field(default_factory=dict)
     lines: list[str] = field(default_factory=list)
     differs: bool = False
+    verdicts: dict[str, Any] = field(default_factory=dict)
 
 
 def settle_files(folder: Path, texts: dict[str, str], check: bool, stale: list[str], again: str) -> Outcome:

@@ -78,15 +78,26 @@ def build_report(
         texts["report.html"] = _page(records | measured, out / "pictures", of.name)
     outcome = settle_files(out, texts, check, sorted(there - set(texts)), of.command("yarnverify report"))
     outcome.lines = [*lines, *outcome.lines]
+    outcome.record = {
+        "tally": records["verdicts"]["tally"],
+        "as_expected": expected,
+        "as_generated": not outcome.differs,
+        "files": sorted(texts),
+    }
     outcome.differs |= not expected
-    outcome.record = {"tally": records["verdicts"]["tally"], "as_expected": expected, "files": sorted(texts)}
+    outcome.verdicts = records["verdicts"]
     return outcome
 
 
 def _page(records: dict[str, Any], folder: Path, name: str) -> str:
+    """The HTML report, with the pictures that are in a folder and the scenes that are drawn there."""
     from yarnverify.report.html import page
 
-    return page(records, {path.stem: path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.svg"))}, name)
+    svg, html = ({path.stem: path.read_text(encoding="utf-8") for path in sorted(folder.glob(f"*.{suffix}"))}
+                 for suffix in ("svg", "html"))  # fmt: skip
+    names = [each["result"]["scene"] for each in (records.get("simulation") or {"scenes": []})["scenes"]]
+    photos = {scene: path.read_bytes() for scene in names if (path := folder / f"{scene}.png").is_file()}
+    return page(records, svg, name, photos=photos, turned=html)
 
 
 def _draw(folder: Path, measured: dict[str, Any], energies: list[str], lines: list[str]) -> None:
@@ -115,9 +126,9 @@ def _draw(folder: Path, measured: dict[str, Any], energies: list[str], lines: li
             write(partial(draw, measured["analysis"]), folder / name)
             lines.append(f"pictures/{name}: drawn")
     if measured["simulation"] is not None:
-        for scene in measured["simulation"]["scenes"]:
-            name, timed = scene["scene"], measured["simulation"]["timings"]["scenes"]
-            write(partial(precision, scene, timed[name]), folder / f"{name}-precision")
+        for each in measured["simulation"]["scenes"]:
+            name = each["result"]["scene"]
+            write(partial(precision, each["result"], each["timings"]), folder / f"{name}-precision")
             lines.append(f"pictures/{name}-precision: drawn")
 
 

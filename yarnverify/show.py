@@ -117,12 +117,16 @@ def tally_lines(record: dict[str, Any]) -> list[str]:
     if record["given"]:
         names = ", ".join(f"{g['block']} ({g['equation']})" for g in record["given"])
         lines.append(f"Taken as given, since nothing declared says what they should be: {names}.")
-    sections = [part["section"] for part in record["completeness"] if part["missing"]]
+    lacking = [
+        f"{part['section']} does not list {', '.join(missing['block'] for missing in part['missing'])}"
+        for part in record["completeness"]
+        if part["missing"]
+    ]
     unknown = [block for part in record["completeness"] for block in part["unknown"]]
     listed = sum(len(part["listed"]) for part in record["completeness"])
     lines.append(
-        f"Lists of non-zero forces and Jacobians: incomplete in {', '.join(sections)}."
-        if sections
+        f"Lists of non-zero forces and Jacobians: incomplete, {'; '.join(lacking)}."
+        if lacking
         else f"Lists of non-zero forces and Jacobians: complete, {listed} block{'s' * (listed != 1)}."
     )
     if unknown:

@@ -163,9 +163,11 @@ class _Conditions:
         return self._known[key]
 
 
-def limits(variant: str, dtype: str) -> str | None:
-    """Which target a variant has: "accurate", "fast", "reference", or none."""
-    return variant if dtype == "float64" and variant in ("accurate", "fast", "reference") else None
+def limits(variant: str, dtype: str, promise: str = "units") -> str | None:
+    """Which target a variant has: "accurate", "fast", "reference", or none; one that promises less is held to less."""
+    if dtype != "float64" or variant not in ("accurate", "fast", "reference") or promise == "none":
+        return None
+    return "fast" if promise == "condition" else variant
 
 
 def _share(target: str, output: str, errors: Errors, conditions: _Conditions) -> tuple[float, int]:
@@ -254,8 +256,9 @@ def cells(energy: Energy, points: Points, unit: Unit) -> list[dict[str, Any]]:
     gone = _zero_length(energy, points)
     found = []
     for variant in unit.variants:
-        computed, invented = compute(kernel(variant, energy.name, unit.derivations), points, exact, unit.dtype)
-        target = limits(variant, unit.dtype)
+        module = kernel(variant, energy.name, unit.derivations)
+        computed, invented = compute(module, points, exact, unit.dtype)
+        target = limits(variant, unit.dtype, module.KERNEL.promise)
         outputs = {}
         for output in OUTPUTS:
             errors = measure(output, computed[output], exact, energy.unknowns, unit.dtype)

@@ -63,7 +63,7 @@ def read_record(path: Path) -> dict[str, Any]:
         record = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
-        raise InputError(f"{path}: {reason}; write it with: yarnverify accuracy --write") from None
+        raise InputError(f"{path}: {reason}; the same command with --write instead of --check makes it") from None
     except ValueError as error:
         raise InputError(f"{path}: is not JSON: {error}") from None
     if not isinstance(record, dict) or record.get("schema") != 1 or not isinstance(record.get("cells"), list):
@@ -78,6 +78,7 @@ def key_of(cell: dict[str, Any]) -> tuple[str, str, str, str]:
 def missed_targets(record: dict[str, Any]) -> list[str]:
     """One line for each output of a cell whose error exceeds its target."""
     lines = []
+    command = record.get("command", "yarnverify accuracy").partition(" --profile")[0]
     for cell in record["cells"]:
         name = ", ".join(key_of(cell))
         if cell["target"] is None:
@@ -90,7 +91,7 @@ def missed_targets(record: dict[str, Any]) -> list[str]:
                 again = found.get("replay_target", found["replay"])
                 lines.append(
                     f"{name}: {output} exceeds its target {share}-fold (worst error {found['worst']} u); "
-                    f"yarnverify accuracy --replay '{again}'"
+                    f"{command} --replay '{again}'"
                 )
     return lines
 

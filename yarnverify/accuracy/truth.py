@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 
 from yarnverify.accuracy.forms import Reduced, reduce, rows_of, state_of
 from yarnverify.errors import InputError
+from yarnverify.symbolic.algebraic import UndefinedError
 from yarnverify.symbolic.declare import Energy
 from yarnverify.symbolic.forward import Evaluation
 from yarnverify.symbolic.jets import Jet
-from yarnverify.symbolic.numbers import Balls, UndefinedError
+from yarnverify.symbolic.numbers import Balls
 from yarnverify.symbolic.tree import Name
 
 Array = NDArray[Any]

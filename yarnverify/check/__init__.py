@@ -2,12 +2,14 @@
 
     conventions.py  how the implementation is called: order of rows, sign, layout, names, outputs
     expressions.py  what an argument is in terms of this energy's: ``R = d/4``
+    setting.py      what a person says about it, and the states and arguments that follow
     cases.py        the states, with their true results and condition numbers
     exchange.py     states and results as JSON, NPZ or CSV
     child.py        the other process: calls a Python function or a C function, state by state
     running.py      starts it; a crash or a hang is found, not suffered
+    sources.py      where results come from: functions, a command line, a file
     judge.py        each block: pass or fail, by one rule
-    recognise.py    what is wrong, where it is recognised; ``factors.py`` finds factors
+    recognise.py    what is wrong: another formula (``formula.py``, ``factors.py``), or lost digits (``digits.py``)
     hints.py        other conventions under which it would be right
     show.py         the tables; command.py puts all of it together
 

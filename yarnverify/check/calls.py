@@ -212,15 +212,17 @@ class Call:
         )
 
 
-def answers(value: Any, name: str) -> dict[str, Any]:
-    """The parts of an answer by name; ``#0``, ``#1`` where they have none."""
+def answers(value: Any, name: str, expected: int = 0) -> dict[str, Any]:
+    """The parts of an answer by name; ``#0``, ``#1`` where they have none.
+
+    A tuple of numbers is one array, unless as many parts as it has numbers are expected.
+    """
     if isinstance(value, Mapping):
         return {str(key): part for key, part in value.items()}
     if hasattr(value, "_asdict"):
         return dict(value._asdict())
-    if isinstance(value, tuple | list) and not all(np.ndim(part) == 0 for part in value):
-        return {f"#{i}": part for i, part in enumerate(value)}
-    if isinstance(value, tuple) and not all(isinstance(part, float | int | np.number) for part in value):
+    parted = isinstance(value, tuple | list) and not all(np.ndim(part) == 0 for part in value)
+    if parted or (isinstance(value, tuple) and len(value) == expected):
         return {f"#{i}": part for i, part in enumerate(value)}
     return {name or "#0": value}
 
@@ -233,7 +235,11 @@ def flattened(value: Any, layout: str, n: int, what: str) -> Array:
     ValueError
         Where it is not made of n times some real numbers.
     """
-    array = np.asarray(value.detach() if hasattr(value, "detach") else value)
+    if hasattr(value, "detach"):  # PyTorch
+        value = value.detach().cpu()
+    elif hasattr(value, "numpy") and not isinstance(value, np.ndarray):  # Warp
+        value = value.numpy()
+    array = np.asarray(value)
     if array.dtype.kind not in "fiub":
         raise ValueError(f"{what} is not made of real numbers but of {array.dtype}")
     if layout == "single":

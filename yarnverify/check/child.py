@@ -79,7 +79,7 @@ def run_python(task: Task) -> None:
         found: dict[str, Array] = {}
         kind = "float64"
         for call in calls:
-            for name, part in answers(call(q, task.values, where, layout), call.name).items():
+            for name, part in answers(call(q, task.values, where, layout), call.name, len(said or ())).items():
                 if said and name.startswith("#") and len(said) > int(name[1:]) and said[int(name[1:])] == "_":
                     continue
                 found[name] = flattened(part, layout, where.stop - where.start, name.replace("#", "answer "))
@@ -113,7 +113,10 @@ def run_python(task: Task) -> None:
     layouts = LAYOUTS if task.task["layout"] == "auto" else (task.task["layout"],)
     chosen, names, kind = _layout(task, layouts, first, parts, fits)
     found, _ = parts(_tried(chosen, first, len(q)), chosen)
-    task.decide({"layout": chosen, "returns": names, "dtype": kind}, sum(part.shape[1] for part in found.values()))
+    task.decide(
+        {"layout": chosen, "returns": names, "dtype": kind, "by_name": calls[0].manner.by_name},
+        sum(part.shape[1] for part in found.values()),
+    )
 
     def one(where: slice) -> None:
         task.begin(where)
@@ -151,7 +154,10 @@ def _layout(
         except Exception as error:
             shape = {"single": "one state", "component": "(rows, states)", "element": "(states, rows)"}[layout]
             why.append(f"{shape}: {type(error).__name__}: {' '.join(str(error).split())[:200]}")
-    raise InputError(f"{task.task['target']}: cannot be called. {' | '.join(why)}")
+    size = task.q.shape[1]
+    raise InputError(
+        f"{task.task['target']}: cannot be called with states of {size} numbers, as --order says. {' | '.join(why)}"
+    )
 
 
 def main() -> None:

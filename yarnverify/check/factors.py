@@ -93,6 +93,48 @@ def goes_on(cases: Cases) -> bool:
     return first.tail == second.head or second.tail == first.head
 
 
+def terms(cases: Cases, size: int) -> dict[str, Array]:
+    """Vectors or matrices that formulas are made of, (size, n): directions d_i, projections P_i, and their products."""
+    shape, rows, n = shape_of(cases.energy), dict(cases.labels), len(cases)
+    if size not in (3, 9):
+        return {}
+    common = shape.edges[0].tail if shape.edges else None
+    directions: dict[str, Array] = {}
+    for edge in shape.edges:
+        step = cases.points.q[rows[edge.head.label]] - cases.points.q[rows[edge.tail.label]]
+        far = edge.tail if edge.head == common else edge.head
+        with np.errstate(all="ignore"):
+            directions[far.sub or far.label] = step / np.sqrt((step**2).sum(axis=0))
+    across = {
+        (a, b): directions[b] - directions[a] * (directions[a] * directions[b]).sum(axis=0)
+        for a in directions
+        for b in directions
+        if a != b
+    }
+    if size == 3:
+        return {f"d_{a}": d for a, d in directions.items()} | {f"P_{a} d_{b}": v for (a, b), v in across.items()}
+    one = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, n))
+    found: dict[str, Array] = {"the unit matrix": one}
+    for a, d in directions.items():
+        found[f"d_{a} d_{a}^T"] = _dyad(d, d)
+        found[f"P_{a}"] = one - _dyad(d, d)
+    for (a, b), v in across.items():
+        found[f"P_{a} d_{b} d_{b}^T P_{a}"] = _dyad(v, v)
+        found[f"P_{a} d_{b} d_{a}^T"] = _dyad(v, directions[a])
+        found[f"d_{a} d_{b}^T P_{a}"] = _dyad(directions[a], v)
+        found[f"P_{a} d_{b} d_{a}^T + d_{a} d_{b}^T P_{a}"] = _dyad(v, directions[a]) + _dyad(directions[a], v)
+        found[f"P_{a} d_{b} d_{a}^T P_{b}"] = _dyad(v, across[b, a])
+        found[f"P_{a} P_{b}"] = np.einsum(
+            "ijn,jkn->ikn", one - _dyad(directions[a], directions[a]), one - _dyad(directions[b], directions[b])
+        )
+        found[f"d_{a} d_{b}^T"] = _dyad(directions[a], directions[b])
+    return {name: value.reshape(9, n) for name, value in found.items()}
+
+
+def _dyad(a: Array, b: Array) -> Array:
+    return np.asarray(a[:, None] * b[None])
+
+
 def ratio(computed: Array, true: Array, tolerance: float) -> Array | None:
     """(n,) what the truth must be multiplied by, where that is one number a state; None where it is not."""
     with np.errstate(all="ignore"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 from typing import Any
@@ -101,10 +102,17 @@ def _state(checked: Checked, at: int) -> dict[str, Any]:
 
 
 def grouped(checked: Checked) -> list[tuple[list[Block], Diagnosis]]:
-    """Blocks of one output with the same verdict and reasons together, in order."""
+    """Blocks of one output with the same verdict and reasons together, in order.
+
+    Reasons that differ in the numbers in brackets only are the same; the longest is kept.
+    """
     groups: dict[Any, tuple[list[Block], Diagnosis]] = {}
     for block, diagnosis in checked.found:
-        groups.setdefault((block.kind, diagnosis.status, diagnosis.reasons), ([], diagnosis))[0].append(block)
+        gist = tuple(re.sub(r" \(.*?\)|: .*", "", reason) for reason in diagnosis.reasons)
+        same = diagnosis.reasons if diagnosis.status == "wrong" else gist
+        blocks, longest = groups.get((block.kind, diagnosis.status, same), ([], diagnosis))
+        longest = max(longest, diagnosis, key=lambda found: sum(map(len, found.reasons)))
+        groups[block.kind, diagnosis.status, same] = ([*blocks, block], longest)
     return list(groups.values())
 
 
@@ -187,9 +195,10 @@ def lines(checked: Checked, groups: list[tuple[list[Block], Diagnosis]]) -> list
     for label, value in checked.extra.items():
         why = "since the energy does not depend on it"
         found.append(f"  results for {label} must be 0, {why}; the largest is {size(value)}")
-    failing = [block for blocks, _ in groups for block in blocks if not block.passes]
+    failing = [block for blocks, _ in groups for block in blocks if not block.passes and block.judged.any()]
     if failing:
-        worst = worst_of(failing)
+        mistaken = [block for blocks, diagnosis in groups for block in blocks if diagnosis.status == "wrong"]
+        worst = worst_of(mistaken or failing)
         at = worst.worst
         entry = int(np.argmax(np.nan_to_num(np.abs(worst.computed[:, at] - worst.true[:, at]), nan=np.inf)))
         component = "" if worst.kind == "E" or worst.computed.shape[0] == 1 else f" (number {entry + 1})"

@@ -44,7 +44,7 @@ def _equations(energy: Energy, folder: Path) -> str:
     found: dict[tuple[str, int, int], dict[str, Any]] = {}
     for claim in [*record["claims"], *record["given"]]:
         if claim.get("section") in ("", None, energy.section) and claim["equation"] in record["equations"]:
-            found.setdefault((claim["equation"], claim["line"], claim["column"]), claim)
+            found.setdefault((claim["equation"], claim["line"], claim.get("column", 1)), claim)
     displays: dict[str, list[str]] = {}
     changes: dict[str, str] = {}
     for (number, _, _), claim in sorted(found.items(), key=lambda item: item[0][1:]):

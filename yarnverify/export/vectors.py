@@ -93,7 +93,7 @@ def golden_vectors(
         energy.summary,
         energy.unit,
         dof_labels(energy.unknowns),
-        tuple(str(parameter.name) for parameter in energy.parameters),
+        tuple(cases.points.parameters),
         tuple(parameter.unit for parameter in energy.parameters),
         cases.tags,
         np.ascontiguousarray(cases.points.q.T),

@@ -164,6 +164,7 @@ class Loops:
         self._outputs = _outputs(batch)
         self._layout = "C" if all(array.flags.c_contiguous for array in (batch.rows, *self._outputs)) else "A"
         self._by_first = self._loop(0)
+        self._memory: dict[tuple[int, int], tuple[Array, Array]] = {}
 
     @cached_property
     def _by_second(self) -> Callable[..., None]:
@@ -191,11 +192,17 @@ class Loops:
         self, loop: Callable[..., None], tape: Tape, where: slice | Array, first: int, number: int, at: Array
     ) -> Array:
         batch = self._batch
-        values = np.empty((len(batch.values), number), batch.dtype)
-        for row, value in zip(values, batch.values_at(where), strict=True):
-            row[:] = value
-        written = sum({"E": 1, "G": batch.dof, "H": batch.dof * (batch.dof + 1) // 2}[key] for key in batch.wanted)
-        rest = np.empty((tape.outputs - written, number), batch.dtype)
+        key = (id(tape), number)
+        if at.size or number < batch.n or key not in self._memory:
+            values = np.empty((len(batch.values), number), batch.dtype)
+            for row, value in zip(values, batch.values_at(where), strict=True):
+                row[:] = value
+            written = sum({"E": 1, "G": batch.dof, "H": batch.dof * (batch.dof + 1) // 2}[key] for key in batch.wanted)
+            rest = np.empty((tape.outputs - written, number), batch.dtype)
+            if number == batch.n and not at.size:
+                self._memory[key] = values, rest
+        else:
+            values, rest = self._memory[key]
         loop(batch.rows, values, first, number, at, *self._outputs, rest)
         return rest
 

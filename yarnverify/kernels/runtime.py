@@ -82,6 +82,9 @@ class Kernel:
         Whether only correctly rounded operations are used, so that bits are the same everywhere.
     numbers
         ``float``, or ``double-double`` for arithmetic in pairs that is rounded once at the end.
+    promise
+        How large errors are, where the variant does not say it: a few ``units`` in the last place, no more than the
+        ``condition`` of the state explains, or ``none`` for formulas that lose digits near singular states.
     """
 
     name: str
@@ -93,6 +96,7 @@ class Kernel:
     scaling: Literal["points", "lengths"] = "lengths"
     portable: bool = True
     numbers: Literal["float", "double-double"] = "float"
+    promise: Literal["units", "condition", "none"] = "units"
     loops: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # compiled ones, as they are made
     _tapes: dict[Any, Tape] = field(default_factory=dict, compare=False, repr=False)
 

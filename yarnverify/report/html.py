@@ -16,7 +16,8 @@ from yarnverify.report.analysis import analysis_tables, fabric_line
 from yarnverify.report.benchmark import tables, where
 from yarnverify.report.mathml import compared, formula
 from yarnverify.report.pages import mistakes
-from yarnverify.report.simulation import frugality, summary
+from yarnverify.report.scenes import overview, scenes
+from yarnverify.report.simulation import frugality
 from yarnverify.report.svg import inline
 
 _FOLDER = Path(__file__).parent
@@ -28,13 +29,20 @@ _PARTS = (  # anchor and heading, in reading order
     ("equations", "Every equation"),
     ("accuracy", "Accuracy"),
     ("speed", "Speed"),
+    ("scenes", "Scenes"),
     ("analysis", "Analysis"),
-    ("simulation", "Simulations"),
     ("commands", "How to get these numbers again"),
 )
 
 
-def page(records: dict[str, Any], pictures: Mapping[str, str], name: str = "") -> str:
+def page(
+    records: dict[str, Any],
+    pictures: Mapping[str, str],
+    name: str = "",
+    *,
+    photos: Mapping[str, bytes] | None = None,
+    turned: Mapping[str, str] | None = None,
+) -> str:
     """The whole report.
 
     Parameters
@@ -45,9 +53,11 @@ def page(records: dict[str, Any], pictures: Mapping[str, str], name: str = "") -
         Name without suffix to SVG text, of those that were drawn.
     name
         What the command line calls the folder that it is about; empty for the one that comes with the package.
+    photos, turned
+        Name of a scene to its picture as PNG, and to the page that shows it in three dimensions.
     """
-    found, derived, analysis = records["verdicts"], records["derivations"], records.get("analysis")
-    simulation = records.get("simulation")
+    found, derived = records["verdicts"], records["derivations"]
+    analysis, simulation = records.get("analysis"), records.get("simulation")
     templates = Environment(
         loader=FileSystemLoader(_FOLDER / "templates" / "page"),
         undefined=StrictUndefined,
@@ -57,10 +67,11 @@ def page(records: dict[str, Any], pictures: Mapping[str, str], name: str = "") -
     )
     templates.filters["math"] = lambda latex: Markup(formula(latex))
     templates.filters["powers"] = _powers
+    templates.filters["capitalize_first"] = lambda text: text[:1].upper() + text[1:]
     templates.globals.update(sign=_SIGN, worst_verdict=_worst, where=where)
     templates.globals.update(argument=f" {name}" if name else "", prefix=f"{name}/" if name else "")
     return templates.get_template("report.html.jinja").render(
-        parts=_PARTS,
+        parts=[part for part in _PARTS if not (name and part[0] in ("scenes", "analysis"))],
         style=Markup((_FOLDER / "templates" / "page" / "report.css").read_text(encoding="utf-8")),
         font=b64encode((_FOLDER / "fonts" / "stix-two-math.woff2").read_bytes()).decode(),
         found=found,
@@ -69,11 +80,15 @@ def page(records: dict[str, Any], pictures: Mapping[str, str], name: str = "") -
         mistakes=[{**claim, "marked": _marked(claim)} for claim in mistakes(found, None)],
         accuracy=records.get("accuracy"),
         analysis=analysis,
-        simulation=simulation,
-        simulated=[summary(simulation), frugality(simulation)] if simulation else [],
         analysed=analysis_tables(analysis) if analysis else [],
         fabric=fabric_line(analysis) if analysis else "",
         benchmark=records.get("benchmark"),
+        simulation=simulation,
+        scenes=scenes(simulation),
+        overview=overview(simulation) if simulation else None,
+        frugal=frugality(simulation) if simulation else None,
+        photos={scene: b64encode(data).decode() for scene, data in (photos or {}).items()},
+        turned=turned or {},
         errors={name: _errors(records.get("accuracy"), name) for name in derived},
         hardest={name: _hardest(records.get("accuracy"), name) for name in derived},
         speeds={name: _speeds(records.get("benchmark"), name) for name in derived},
@@ -147,5 +162,10 @@ _ALT = {
 
 def _drawn(text: str, name: str) -> Markup:
     energy, _, what = name.rpartition("-")
+    if what == "precision":
+        alt = (
+            f"Relative error over seconds, for every way to solve {energy.replace('_', ' ')}; the table above has both."
+        )
+        return Markup(inline(text, name, alt))
     alt = _ALT.get(name) or _ALT.get(what, name.replace("-", " ")).format(energy)
     return Markup(inline(text, name, alt))

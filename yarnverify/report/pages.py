@@ -84,10 +84,10 @@ def pages(
         texts["simulation.md"] = _render(
             "simulation.md.jinja",
             record=simulation,
-            where=where(simulation["timings"]),
+            where=where(simulation),
             summary=summary(simulation),
             frugality=frugality(simulation),
-            studies={scene["scene"]: studies(simulation, scene) for scene in simulation["scenes"]},
+            studies={each["result"]["scene"]: studies(each) for each in simulation["scenes"]},
             pictures=pictures,
         )
     return dict(sorted(texts.items()))

@@ -14,8 +14,9 @@ NO_ANSWER = "no answer any more"
 def summary(record: Mapping[str, Any]) -> Table:
     """A row an answer: of each scene in its first way, at its largest size."""
     rows = []
-    for scene in record["scenes"]:
-        line, timed = scene["lines"][0], record["timings"]["scenes"][scene["scene"]]["lines"][0]
+    for each in record["scenes"]:
+        scene = each["result"]
+        line, timed = scene["lines"][0], each["timings"]["lines"][0]
         run, name = line["runs"][-1], scene["scene"]
         size, seconds = f"{run['size']} {scene['size']}", _time(timed["runs"][-1]["seconds"])
         for answer in run["answers"]:
@@ -29,9 +30,9 @@ def summary(record: Mapping[str, Any]) -> Table:
     ))  # fmt: skip
 
 
-def studies(record: Mapping[str, Any], scene: Mapping[str, Any]) -> list[Table]:
+def studies(each: Mapping[str, Any]) -> list[Table]:
     """A table for each way to solve a scene."""
-    timed = record["timings"]["scenes"][scene["scene"]]["lines"]
+    scene, timed = each["result"], each["timings"]["lines"]
     tables = []
     for line, times in zip(scene["lines"], timed, strict=True):
         rows = []
@@ -56,11 +57,13 @@ def studies(record: Mapping[str, Any], scene: Mapping[str, Any]) -> list[Table]:
     return tables
 
 
-def frugality(record: Mapping[str, Any]) -> Table:
-    """Each scene as it is, with all energies, and with all sliding coordinates as well."""
+def frugality(record: Mapping[str, Any]) -> Table | None:
+    """Each scene as it is, with all energies, and with all sliding coordinates as well; None where that was not measured."""
     rows = []
-    for scene in record["scenes"]:
-        found, timed = scene["frugality"], record["timings"]["scenes"][scene["scene"]]["frugality"]
+    for each in record["scenes"]:
+        if "frugality" not in each:
+            return None
+        scene, found, timed = each["result"], each["frugality"]["result"], each["frugality"]["timings"]
         for way in WAYS:
             own, time, base = found[way], timed[way], timed["own"]
             first = (
@@ -93,8 +96,8 @@ def frugality(record: Mapping[str, Any]) -> Table:
 def _spent(own: Mapping[str, Any], time: Mapping[str, Any], base: Mapping[str, Any]) -> tuple[str, str]:
     if time is base:
         return _time(time["seconds"]), f"{time['bytes'] / 1e6:.2g} MB"
-    longer = f"{time['seconds'] / base['seconds']:.2g}"
-    return (f"stopped at {longer}" if own["trouble"] else longer), f"{time['bytes'] / base['bytes']:.2g}"
+    longer = _number(time["seconds"] / base["seconds"], "times")
+    return (f"stopped at {longer}" if own["trouble"] else longer), _number(time["bytes"] / base["bytes"], "times")
 
 
 def _moved(own: Mapping[str, Any], way: str) -> str:
@@ -127,4 +130,9 @@ def _value(answer: Mapping[str, Any], which: str) -> str:
 
 
 def _time(seconds: float) -> str:
-    return f"{seconds:.2g} s" if seconds >= 1 else f"{1e3 * seconds:.2g} ms"
+    return _number(seconds, "s") if seconds >= 1 else _number(1e3 * seconds, "ms")
+
+
+def _number(value: float, unit: str) -> str:
+    """Two digits, but no power of ten."""
+    return f"{value:.0f} {unit}" if value >= 10 else f"{value:.1f} {unit}" if value >= 1 else f"{value:.2g} {unit}"

@@ -8,7 +8,7 @@ Elements go through kernel and sum a chunk at a time, in memory that is kept: no
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import replace
 from time import perf_counter
@@ -56,7 +56,7 @@ class System:
     Attributes
     ----------
     seconds
-        Time spent so far, by ``kernels`` and ``assembly``.
+        Time spent so far, by ``kernels`` and ``assembly``, as told by ``clock``.
     """
 
     def __init__(
@@ -90,7 +90,9 @@ class System:
         self.scatter: Scatter = Loops() if self.engine == "compiled" else Arrays()
         self._forms: list[Form] = [form_of(t.kernel) if definite == "quick" else eigenvalues for t in self.terms]
         self._memory: dict[tuple[int, int], list[Array]] = {}
+        self._batches: dict[tuple[int, str], tuple[Term, Batch]] = {}  # with its term, whose id is taken as long
         self.seconds = {"kernels": 0.0, "assembly": 0.0}
+        self.clock: Callable[[], float] = perf_counter
         self.nodes, self.coordinates = owners(np.asarray(Q, float), self.active, tables)
 
     @property
@@ -153,16 +155,17 @@ class System:
                 e, g, packed = self._run(term, "EGH", q, part)
                 if definite:
                     self._form(number, term, q, part, packed)
-            start = perf_counter()
+            start = self.clock()
             total += float(np.add.reduce(e))
-            force = max(force, float(g.max(initial=0.0)), -float(g.min(initial=0.0)))
+            most, least = np.maximum.reduce(g, None, initial=0.0), np.minimum.reduce(g, None, initial=0.0)
+            force = max(force, float(most), -float(least))
             self.scatter.entries(slope, term.table.rows[:, part], g)
             if packed is not None:
                 self.scatter.blocks(sums, places, part, packed, places.pairs)
-            self.seconds["assembly"] += perf_counter() - start
-        start = perf_counter()
+            self.seconds["assembly"] += self.clock() - start
+        start = self.clock()
         matrix = self.pattern.matrix(sums)
-        self.seconds["assembly"] += perf_counter() - start
+        self.seconds["assembly"] += self.clock() - start
         return Evaluation(total, (slope - self.loads)[self.active], matrix, force)
 
     def worst(self, Q: Array) -> Worst | None:
@@ -217,9 +220,9 @@ class System:
                 part = slice(start, min(start + CHUNK, n))
                 rows = term.table.rows[:, part]
                 q = self._output(rows.shape[0], rows.shape[1])[3]
-                before = perf_counter()
+                before = self.clock()
                 np.take(Q, rows, out=q, mode="clip")
-                self.seconds["assembly"] += perf_counter() - before
+                self.seconds["assembly"] += self.clock() - before
                 yield term, number, part, q
 
     def _output(self, dof: int, n: int) -> list[Array]:
@@ -230,23 +233,34 @@ class System:
         return self._memory[dof, n]
 
     def _run(self, term: Term, wanted: str, q: Array, part: Any, fresh: bool = False) -> list[Array]:
-        start = perf_counter()
-        kept = [] if fresh else [self._output(*q.shape)["EGH".index(key)] for key in wanted]
-        out: Any = None if fresh else kept if len(kept) > 1 else kept[0]
+        start = self.clock()
         try:
-            found = Batch(term.kernel.KERNEL, wanted, q, term.some(part), out=out, engine=self.engine).results()
+            found = self._batch(term, wanted, q, part, fresh).again()
         except ElementError as error:
             at = error.elements + (part.start if isinstance(part, slice) else 0)
             reason = str(error).partition(f"element {error.elements[0]}: ")[2]
             raise ElementError(f"{term.name}: element {at[0]}: {reason}", at) from None
         finally:
-            self.seconds["kernels"] += perf_counter() - start
+            self.seconds["kernels"] += self.clock() - start
         return found
 
+    def _batch(self, term: Term, wanted: str, q: Array, part: Any, fresh: bool) -> Batch:
+        """The call of a kernel; that of a table of one chunk is kept, since making it costs more than a few elements do."""
+        whole = not fresh and q.shape[1] == term.table.count
+        key = (id(term), wanted)
+        if whole and key in self._batches:
+            return self._batches[key][1]
+        kept = [] if fresh else [self._output(*q.shape)["EGH".index(letter)] for letter in wanted]
+        out: Any = None if fresh else kept if len(kept) > 1 else kept[0]
+        made = Batch(term.kernel.KERNEL, wanted, q, term.some(part), out=out, engine=self.engine)
+        if whole:
+            self._batches[key] = term, made
+        return made
+
     def _form(self, number: int, term: Term, q: Array, part: slice, packed: Array) -> None:
-        start = perf_counter()
+        start = self.clock()
         self._forms[number](q, term.some(part), packed, self.pattern.places[number].pairs.tolist())
-        self.seconds["kernels"] += perf_counter() - start
+        self.seconds["kernels"] += self.clock() - start
 
 
 def _indices(active: ArrayLike, size: int) -> Array:

@@ -99,7 +99,7 @@ def record_all(folder: Path, tell: Tell) -> tuple[Path, list[str]]:
     from yarnverify.simulation.scenes import SCENES
 
     record = measure([scene for scene in SCENES if scene.validates], tell)
-    return write(record, folder), [line for scene in record["scenes"] for line in scene["missed"]]
+    return write(record, folder), [line for each in record["scenes"] for line in each["result"]["missed"]]
 
 
 def simulate(
@@ -218,15 +218,15 @@ class Files:
 
         problem, arrays = found.problem, found.arrays
         title = found.result["title"]
-        look = {"colour": problem.colour, "view": problem.view}
+        look = {"colour": problem.colour, "view": problem.view, "solids": problem.solids}
         path = self.folder / self.name
         written = [picture(problem.fabric, arrays["Q"], path.with_suffix(".png"), title=title, **look)]
+        frames, times = [arrays["Q"]], None
         if "frames" in arrays and len(arrays["frames"]) > 1:
-            frames, times = arrays["frames"], [float(t) for t in arrays["frame times"]]
-            written.append(movie(problem.fabric, list(frames), path.with_suffix(".gif"), times=times, **look))
-            written.append(scene(problem.fabric, frames, path.with_suffix(".html"), times=times, title=title))
-        else:
-            written.append(scene(problem.fabric, arrays["Q"], path.with_suffix(".html"), title=title))
+            frames, times = list(arrays["frames"]), [float(t) for t in arrays["frame times"]]
+            written.append(movie(problem.fabric, frames, path.with_suffix(".gif"), times=times, **look))
+        page = scene(problem.fabric, frames, path.with_suffix(".html"), times=times, title=title, solids=problem.solids)
+        written.append(page)
         if problem.known and len(found.result["lines"][0]["runs"]) > 1:
             from yarnverify.report.precision import write_precision
 

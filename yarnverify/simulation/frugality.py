@@ -23,8 +23,8 @@ from yarnverify.simulation.setting import Known, Outcome, Setting, Static
 # shear modulus 4 k_x/L of 40 N/m at L = 1 mm, a contact that gives by a tenth of R under 2 mN; no weight where there was none
 COTTON: dict[str, Any] = {"k_s": 50.0, "k_b": 1e-9, "k_x": 0.01, "k_c": 1e5, "rho": 1e-4, "g": (0.0, 0.0, 0.0)}
 ALL = ((stretch, segments), (bending, bends), (shear, shears), (parallel_contact, contacts), (gravity, segments))
-ITERATIONS = 40  # of a stage, before it is given up
-PATIENCE = 20.0  # times as long as the scene itself takes, but LEAST seconds at least, before the rest is given up
+ITERATIONS = 150  # of a stage, before it is given up
+PATIENCE = 60.0  # times as long as the scene itself takes, but LEAST seconds at least, before the rest is given up
 LEAST = 2.0
 
 

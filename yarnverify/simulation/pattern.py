@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,44 +18,41 @@ from scipy import sparse
 from yarnverify.kernels.batch import upper
 from yarnverify.simulation.blocks import Blocks, Elements, groups, zeros
 
-__all__ = ["Elements", "Pair", "Pattern", "Places", "zeros"]
+__all__ = ["Elements", "Pattern", "Places", "zeros"]
 
 Array = NDArray[Any]
 ROWS = 16384  # blocks whose rows are made at a time, so that memory on the way stays small
 
 
-class Pair(NamedTuple):
-    """A pair of blocks of an element, and the entries of its Hessian that are summed there.
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where the Hessian of one table goes.
 
     Attributes
     ----------
+    pairs
+        Sorted rows of the packed Hessian that matter, (k,).
     base
-        Where the block stands in the sums, (n,); the end of the sums for what belongs nowhere.
+        Where in the sums each pair of blocks of an element stands, (blocks, n); their end for what belongs nowhere.
     turned
-        Whether the block stands there transposed, (n,) of 0 and 1, or empty where it never does.
-    which, straight, transposed
-        Which of ``Places.pairs`` they are, and their places in the block as it is and transposed, (k,) each.
+        Whether it stands there transposed, (blocks, n) of 0 and 1, or (0, 0) where none does.
+    block, which, straight, transposed
+        In the order in which they are summed, (k,) each: the pair of blocks of each of ``pairs``, which of them it is, and
+        its place in the block as it is and transposed.
     """
 
+    pairs: Array
     base: Array
     turned: Array
+    block: Array
     which: Array
     straight: Array
     transposed: Array
 
-
-@dataclass(frozen=True, eq=False)
-class Places:
-    """Where the Hessian of one table goes: sorted rows of the packed Hessian that matter, (k,), and their pairs of blocks."""
-
-    pairs: Array
-    blocks: tuple[Pair, ...]
-
     def turn(self, values: Array, part: slice) -> None:
         """Change the sign of entries (k, m) of a skew matrix where their block is summed transposed."""
-        for pair in self.blocks:
-            if pair.turned.size:
-                values[pair.which] *= 1 - 2 * pair.turned[part]
+        if self.turned.size:
+            values[self.which] *= 1 - 2 * self.turned[self.block, part]
 
 
 class Pattern:
@@ -106,19 +104,21 @@ class Pattern:
         return found[np.searchsorted(found, 0) :]  # without the -1 of what is not unknown
 
     def _places(self, table: Elements, wanted: _Wanted, keys: Array, start: Array) -> Places:
-        heads, made = self._heads(table), []
-        needed = np.sort(np.array([k for entries in wanted.values() for k, _, _ in entries], np.int64))
-        for (a, b), entries in wanted.items():
+        heads, sizes = self._heads(table), [len(group) for group in groups(table.labels)]
+        base = np.full((len(wanted), table.rows.shape[1]), self.sums, self._kind)
+        turned = np.zeros(base.shape, np.int8)
+        entries = []
+        for block, ((a, b), places) in enumerate(wanted.items()):
             key = _key(heads[a], heads[b], self._blocks.count)
-            base = np.full(key.size, self.sums, self._kind)
             there = key >= 0
-            base[there] = start[np.searchsorted(keys, key[there])]
-            turned = ((heads[a] > heads[b]) & there).astype(np.int8)
-            first, second = (len(groups(table.labels)[k]) for k in (a, b))
-            k, i, j = np.array(entries, np.int64).T
-            which = np.searchsorted(needed, k)
-            made.append(Pair(base, turned if turned.any() else turned[:0], which, i * second + j, j * first + i))
-        return Places(needed, tuple(made))
+            base[block, there] = start[np.searchsorted(keys, key[there])]
+            turned[block] = (heads[a] > heads[b]) & there
+            entries += [(block, k, i * sizes[b] + j, j * sizes[a] + i) for k, i, j in places]
+        block_of, pairs, straight, transposed = np.array(entries, np.int64).reshape(-1, 4).T
+        needed = np.sort(pairs)
+        kept = turned if turned.any() else np.empty((0, 0), np.int8)
+        which = np.searchsorted(needed, pairs)
+        return Places(needed, base, kept, *(np.ascontiguousarray(a) for a in (block_of, which, straight, transposed)))
 
     def _spread(self, active: Array, row: Array, column: Array, start: Array) -> None:
         """Rows of the matrix in its unknowns, and where in the sums its entries come from."""
@@ -173,8 +173,17 @@ class Pattern:
 
     def matrix(self, sums: Array) -> sparse.csc_array:
         """The full symmetric matrix of sums (sums + 9,)."""
+        found = sparse.csc_array.__new__(sparse.csc_array)
+        found.__dict__ |= self._empty.__dict__  # a copy without the checks, which small matrices would feel
+        found.data = sums.take(self._source)
+        return found
+
+    @cached_property
+    def _empty(self) -> sparse.csc_array:
+        """The matrix without its values, checked once."""
         shape = (self.count, self.count)
-        found = sparse.csc_array((sums.take(self._source), self.indices, self.indptr), shape=shape)
+        nothing = np.broadcast_to(np.zeros(1), self.indices.shape)
+        found = sparse.csc_array((nothing, self.indices, self.indptr), shape=shape)
         found.has_sorted_indices = True
         found.has_canonical_format = True
         return found
@@ -189,8 +198,7 @@ class Pattern:
     def bytes(self) -> int:
         """Memory that it takes."""
         held = [self.local, self._blocks.of, self._blocks.inner, self.indptr, self.indices, self._source]
-        pairs = [pair for places in self.places for pair in places.blocks]
-        return sum(a.nbytes for a in held) + sum(pair.base.nbytes + pair.turned.nbytes for pair in pairs)
+        return sum(a.nbytes for a in held) + sum(places.base.nbytes + places.turned.nbytes for places in self.places)
 
 
 _Wanted = dict[tuple[int, int], list[tuple[int, int, int]]]

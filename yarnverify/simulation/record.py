@@ -18,37 +18,31 @@ ROUNDS = 2  # the shorter time of these counts: the first one meets cold memory
 
 
 def measure(scenes: Sequence[Scene], tell: Tell = lambda label, done: None) -> dict[str, Any]:
-    """The record: ``scenes``, the same each time on a machine, and ``timings``, which belong to a machine and a moment."""
-    found: list[dict[str, Any]] = []
-    timings: dict[str, Any] = {}
-    for number, scene in enumerate(scenes):
+    """The record: for each scene a ``result``, the same each time on a machine, and timings, which belong to a moment."""
+    found = [_measured(scene, (number, len(scenes)), tell) for number, scene in enumerate(scenes)]
+    return {"schema": 1, "command": COMMAND, "environment": environment(("scipy",), None), "scenes": found}
 
-        def told(label: str, done: float, number: int = number, name: str = scene.name) -> None:
-            tell(f"{name}, {label}", (number + 0.5 * done) / len(scenes))
 
-        rounds = [study(scene, scene.sizes, {}, tell=told) for _ in range(ROUNDS)]
-        line, size = scene.lines()[0], scene.sizes[1]
-        told(f"{size}: with everything switched on", 1.0)
-        spared, spared_timed = frugality(scene.problem(size, line.values), size)
-        found.append({**rounds[0].result, "frugality": spared})
-        timings[scene.name] = {
-            "lines": _shortest([each.timings["lines"] for each in rounds]),
-            "frugality": spared_timed,
-        }
+def _measured(scene: Scene, place: tuple[int, int], tell: Tell) -> dict[str, Any]:
+    def told(label: str, done: float) -> None:
+        tell(f"{scene.name}, {label}", (place[0] + 0.5 * done) / place[1])
+
+    rounds = [study(scene, scene.sizes, {}, tell=told) for _ in range(ROUNDS)]
+    size = scene.sizes[1]
+    told(f"{size}: with everything switched on", 1.0)
+    spared, spared_timed = frugality(scene.problem(size, scene.lines()[0].values), size)
+    lines = [_shortest(same) for same in zip(*(each.timings["lines"] for each in rounds), strict=True)]
     return {
-        "schema": 1,
-        "command": COMMAND,
-        "scenes": found,
-        "timings": {"environment": environment(("scipy",), None), "rounds": ROUNDS, "scenes": timings},
+        "result": rounds[0].result,
+        "timings": {**rounds[0].timings, "lines": lines},
+        "frugality": {"result": spared, "timings": spared_timed},
     }
 
 
-def _shortest(rounds: Sequence[list[dict[str, Any]]]) -> list[dict[str, Any]]:
-    return [
-        {"name": lines[0]["name"], "runs": [min(runs, key=lambda run: float(run["seconds"]))
-                                            for runs in zip(*(line["runs"] for line in lines), strict=True)]}
-        for lines in zip(*rounds, strict=True)
-    ]  # fmt: skip
+def _shortest(lines: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The shortest run of each size."""
+    sizes = zip(*(line["runs"] for line in lines), strict=True)
+    return {"name": lines[0]["name"], "runs": [min(runs, key=lambda run: float(run["seconds"])) for runs in sizes]}
 
 
 def write(record: dict[str, Any], folder: Path) -> Path:

@@ -47,13 +47,21 @@ class Arrays:
 
     def blocks(self, sums: Array, places: Places, part: slice, values: Array, rows: Array) -> None:
         """Add entries of blocks."""
-        for pair in places.blocks:
-            base, turned = pair.base[part].astype(np.intp), pair.turned[part].astype(np.intp)
-            for k, straight, transposed in zip(rows[pair.which], pair.straight, pair.transposed, strict=True):
-                at = base + straight
-                if turned.size and transposed != straight:
-                    at += (transposed - straight) * turned
-                np.add.at(sums, at, values[k])
+        turned, block = None, -1
+        for number, which, straight, transposed in zip(
+            places.block.tolist(),
+            places.which.tolist(),
+            places.straight.tolist(),
+            places.transposed.tolist(),
+            strict=True,
+        ):
+            if number != block:
+                block, base = number, places.base[number, part].astype(np.intp)
+                turned = places.turned[number, part].astype(np.intp) if places.turned.size else None
+            at = base + straight
+            if turned is not None and transposed != straight:
+                at += (transposed - straight) * turned
+            np.add.at(sums, at, values[rows[which]])
 
 
 class Loops:
@@ -74,9 +82,11 @@ class Loops:
 
     def blocks(self, sums: Array, places: Places, part: slice, values: Array, rows: Array) -> None:
         """Add entries of blocks."""
-        for pair in places.blocks:
-            base, turned = pair.base[part], pair.turned[part]
-            self._blocks(sums, base, turned, values, rows[pair.which], pair.straight, pair.transposed)
+        turned = places.turned[:, part] if places.turned.size else places.turned
+        self._blocks(
+            sums, places.base[:, part], turned, values, rows[places.which],
+            places.block, places.straight, places.transposed,
+        )  # fmt: skip
 
 
 @cache
@@ -94,14 +104,15 @@ def _loops() -> tuple[Any, Any]:
                 sums[np.uint64(places[e])] += row[e]
 
     @njit(cache=True, nogil=True)
-    def blocks(sums, base, turned, values, rows, straight, transposed):  # type: ignore[no-untyped-def]
+    def blocks(sums, base, turned, values, rows, block, straight, transposed):  # type: ignore[no-untyped-def]
         for k in range(rows.size):
-            row = values[rows[k]]
-            if turned.size:
-                for e in range(base.size):
-                    sums[np.uint64(base[e] + (transposed[k] if turned[e] else straight[k]))] += row[e]
+            row, at, here, there = values[rows[k]], base[block[k]], straight[k], transposed[k]
+            if turned.size and here != there:
+                other = turned[block[k]]
+                for e in range(at.size):
+                    sums[np.uint64(at[e] + (there if other[e] else here))] += row[e]
             else:
-                for e in range(base.size):
-                    sums[np.uint64(base[e] + straight[k])] += row[e]
+                for e in range(at.size):
+                    sums[np.uint64(at[e] + here)] += row[e]
 
     return entries, blocks

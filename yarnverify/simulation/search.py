@@ -29,6 +29,11 @@ Array = NDArray[Any]
 EPSILON = float(np.finfo(float).eps)
 
 
+def greatest(values: Array) -> float:
+    """The greatest entry in absolute value, 0 of none."""
+    return float(np.maximum.reduce(np.abs(values), initial=0.0))
+
+
 @dataclass(eq=False)
 class Search:
     """A search and its state: where it is, the best so far, and how many line searches are still to be made."""
@@ -62,36 +67,37 @@ class Search:
             first = False
             progress = self._remember(value)
             factor, step = None, np.zeros(0)
-            rest = float(np.abs(value.gradient).max(initial=0.0)) <= self.options.residual * value.force
+            residual = size = greatest(value.gradient)
+            rest = residual <= self.options.residual * value.force
             if not rest:
                 factor, step = self._direction(value)
-                rest = self._explained(value, step)
+                size = greatest(step)
+                rest = self._explained(value, residual, size)
             if rest:
                 departure, negative = self._beside(value, factor)
                 if departure is not None:
                     self.departures += 1
-                    self._note(value, float(np.abs(departure - self.Q).max()), "departure")
+                    self._note(value, residual, greatest(departure - self.Q), "departure")
                     self._start_again(departure, 3)
                 elif value.energy > ceiling + 1e-9 * abs(ceiling):
-                    self._return(value)
+                    self._return(value, residual)
                 else:
-                    self._note(value, 0.0, "end")
+                    self._note(value, residual, 0.0, "end")
                     left = step if step.size else np.zeros_like(value.gradient)
                     return Equilibrium(self.Q, value.energy, self.history, negative, self.departures, self.steps.seconds,
                                        value.gradient, left)  # fmt: skip
                 continue
-            size = float(np.abs(step).max())
             progress |= size < 0.5 * self._step
             self._step = min(size, self._step)
             self._stale = 0 if progress or self.searching else self._stale + 1
             self._fulls += not self.searching
             if self._stale > self.options.patience or self._fulls > 6 * self.options.patience:
-                self._return(value)
+                self._return(value, residual)
             elif self.searching:
                 self.searching -= 1
-                self._note(value, self._searched(value, step), "search")
+                self._note(value, residual, self._searched(value, step), "search")
             else:
-                self._note(value, self._full(value, step), "full")
+                self._note(value, residual, self._full(value, step, size), "full")
         raise self._failed(f"no equilibrium after {len(self.history)} iterations")
 
     # -- the course of a search
@@ -101,8 +107,8 @@ class Search:
         self._energy, self._step, self._stale, self._fulls = np.inf, np.inf, 0, 0
         self._residual, self.searching = np.inf, searches
 
-    def _return(self, value: Evaluation) -> None:
-        self._note(value, 0.0, "return")
+    def _return(self, value: Evaluation, residual: float) -> None:
+        self._note(value, residual, 0.0, "return")
         self.returns -= 1
         self._start_again(self._lowest, 15)
 
@@ -115,21 +121,21 @@ class Search:
         self._energy = value.energy
         return True
 
-    def _note(self, value: Evaluation, step: float, kind: Kind) -> None:
-        line = Iteration(value.energy, float(np.abs(value.gradient).max(initial=0.0)), step, kind)
+    def _note(self, value: Evaluation, residual: float, step: float, kind: Kind) -> None:
+        line = Iteration(value.energy, residual, step, kind)
         self.history.append(line)
         if self.report is not None:
             self.report(line)
 
-    def _explained(self, value: Evaluation, step: Array) -> bool:
+    def _explained(self, value: Evaluation, residual: float, size: float) -> bool:
         """Whether the coordinates cannot be told any better: the step or the residual is what rounding them makes of it."""
-        size, extent = float(np.abs(step).max()), float(np.ptp(self.Q))
+        extent = float(np.ptp(self.Q))
         if size <= self.options.step * extent:
             return True
         if size > 1e-7 * extent:
             return False
         found = np.abs(value.gradient)
-        before, self._residual = self._residual, float(found.max())
+        before, self._residual = self._residual, residual
         noise = EPSILON * (abs(value.matrix) @ np.abs(self.Q[self.steps.problem.active]))
         if (found <= np.maximum(noise, self.options.residual * value.force)).all():
             return True
@@ -155,7 +161,7 @@ class Search:
         except LinearSolveError as error:
             raise self._failed(str(error)) from error
 
-    def _full(self, value: Evaluation, step: Array) -> float:
+    def _full(self, value: Evaluation, step: Array, size: float) -> float:
         """The full step, or a search where it leads out of the domain of an element."""
         Q = self.steps.moved(self.Q, step)
         try:
@@ -163,7 +169,7 @@ class Search:
         except ElementError:
             return self._searched(value, step)
         self.Q = Q
-        return float(np.abs(step).max())
+        return size
 
     def _searched(self, value: Evaluation, step: Array) -> float:
         self.Q, length = self.steps.line_search(self.Q, value, step)

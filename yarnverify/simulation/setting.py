@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from yarnverify.simulation.assembly import System, Term
 from yarnverify.simulation.cloth import Fabric
 from yarnverify.simulation.dynamics import Motion, Scheme
+from yarnverify.simulation.solids import Ball
 
 Array = NDArray[Any]
 
@@ -133,6 +134,8 @@ class Static:
         What pictures are coloured by; None for the yarns.
     view
         From where pictures are seen.
+    solids
+        What the yarns lie on, in pictures.
     """
 
     fabric: Fabric
@@ -145,6 +148,7 @@ class Static:
     watch: Mapping[str, Callable[[Outcome], float]] = field(default_factory=dict)
     colour: str | None = None
     view: Any = "oblique"
+    solids: Sequence[Ball] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +157,7 @@ class Moving:
 
     Attributes
     ----------
-    fabric, terms, active, known, start, options, watch, colour, view
+    fabric, terms, active, known, start, options, watch, colour, view, solids
         As for ``Static``; ``start`` is the configuration at time 0, and values are recorded after each step.
     kinetic
         Kinetic kernel, its table and the linear density.
@@ -191,6 +195,7 @@ class Moving:
     frames: int = 40
     colour: str | None = None
     view: Any = "oblique"
+    solids: Sequence[Ball] = ()
 
 
 Setting = Static | Moving

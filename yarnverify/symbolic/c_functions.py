@@ -5,6 +5,7 @@ So the C code and the NumPy kernels share their functions, and every operation i
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from typing import Any, TypeAlias
 
@@ -45,7 +46,11 @@ class Functions:
 
     def __init__(self) -> None:
         self._known: dict[tuple[str, Shape], tuple[str, Shape]] = {}
-        self.texts: list[str] = []
+        self._texts: dict[str, str] = {}
+
+    def used_in(self, code: str) -> list[str]:
+        """The texts of the functions that some code calls."""
+        return [text for name, text in self._texts.items() if re.search(rf"\b{name}\(", code)]
 
     def named(self, name: str, arguments: tuple[Any, ...]) -> tuple[str, Shape]:
         """The C name of a function for arguments of these shapes, and the shape of its result."""
@@ -72,7 +77,7 @@ class Functions:
             head = f"static void {c_name}({given}, double *r)"
             last = [f"    r[{i}] = {text};" for i, text in enumerate(returned)]
         summary = (function.__doc__ or "").strip().splitlines()[0].replace("``", "").replace("*/", "")
-        self.texts.append("\n".join([f"/* {summary} */", head, "{", *lines, *last, "}"]))
+        self._texts[c_name] = "\n".join([f"/* {summary} */", head, "{", *lines, *last, "}"])
         return c_name, shape_of(result)
 
 

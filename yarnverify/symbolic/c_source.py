@@ -184,7 +184,7 @@ def _texts(energy: Energy, programs: list[Program], notes: list[str]) -> dict[st
     symbols = [(str(symbol), length_power(p.unit)) for p in energy.parameters for symbol in given_symbols(p.name)]
     functions = Functions()
     shapes = [_function(made, rows, [name for name, _ in symbols], functions) for made in programs]
-    code = "\n".join(line for shape in shapes for line in shape["lines"])
+    code = "\n".join(line for shape in shapes for line in (*shape["lines"], *shape["results"]))
     calls = [line for made in programs for line in made.prologue]
     points = [i for i, label in enumerate(labels) if "." in label]
     portable = not any(re.search(rf"\b{'acos' if f == 'arccos' else f}\(", code) for f in LIBRARY)
@@ -196,7 +196,7 @@ def _texts(energy: Energy, programs: list[Program], notes: list[str]) -> dict[st
         "dof": len(labels),
         "parameters": [(identifier(p.name), p.unit) for p in energy.parameters],
         "powers": [power for _, power in symbols],
-        "functions": functions.texts,
+        "functions": functions.used_in(code),
         "shapes": shapes,
         "chosen": programs[0].choice is not None,
         "points": points,

@@ -20,20 +20,24 @@ from typing import Any
 
 import flint
 
+from yarnverify.symbolic.algebraic import NoValueError, UndefinedError
+from yarnverify.symbolic.blocks import Blocks, flat, paired
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.forward import Evaluation, entries
 from yarnverify.symbolic.latex import name_latex
-from yarnverify.symbolic.normal import Field, Quotient
-from yarnverify.symbolic.numbers import Balls, NoValueError, Rationals, UndefinedError
-from yarnverify.symbolic.reading import UnsupportedError, Value, map_value
+from yarnverify.symbolic.normal import Field
+from yarnverify.symbolic.numbers import Balls, Rationals
+from yarnverify.symbolic.reading import UnsupportedError
 from yarnverify.symbolic.signs import Signature, in_floats, lie_of, side_of, sided
 from yarnverify.symbolic.states import StateMaker
-from yarnverify.symbolic.tree import FORCE, Expr, Name, is_zero
+from yarnverify.symbolic.tree import Expr, Name, is_zero
 
 EXACT_STATES = 3  # the second reading's; each is a proof of difference, or one more agreement
 _TRIES = 16 * EXACT_STATES  # states drawn in search of such at which both sides have a value
 _WIDE = 160  # states drawn in search of the other side of an absolute value or root
 _SIDES = 24  # states at which a claim is compared that has several sides
+_LOOKED_AT = 2  # states at which what is proved is enclosed by balls
+_REGIONS = 12  # of signs, in each of which a claim is proved anew
 _BALL_BITS = (128, 512, 2048, 8192, 32768)
 _FEW_BITS = _BALL_BITS[:2]
 
@@ -112,42 +116,51 @@ class Court:
     # -- first reading
 
     @cached_property
-    def field(self) -> Field:
-        return Field(self.section, self.names, self.positive)
+    def forms(self) -> Blocks:
+        """Normal forms, with signs as far as assumptions settle them."""
 
-    @cached_property
-    def _energy_value(self) -> Value:
-        return self.field.value(self.energy)
+        def samples() -> list[dict[Name, Any]]:
+            return [dict(evaluation.state) for evaluation in self.exact]
+
+        return Blocks(Field(self.section, self.names, self.positive, samples), self.energy)
 
     @property
     def without_value(self) -> bool:
         """Whether the energy divides by what is zero everywhere."""
         try:
-            return self._energy_value is None
+            return self.forms.energy is None
         except ZeroDivisionError:
             return True
         except UnsupportedError:
             return False
 
     @cached_property
-    def _blocks(self) -> dict[Expr, Value]:
+    def _regions(self) -> dict[int, Blocks]:
         return {}
 
-    def block(self, expr: Expr) -> Value:
-        """True normal form of a force, an energy or a derivative."""
-        if expr not in self._blocks:
-            with self.field.claim(printed=False):
-                self._blocks[expr] = self._find_block(expr)
-        return self._blocks[expr]
+    def _equal_in_regions(self, left: Expr, right: Expr) -> bool:
+        """Whether two trees are equal in every region of signs that a state lies in, each with normal forms of its own.
 
-    def _find_block(self, expr: Expr) -> Value:
-        if expr.op == "energy":
-            return self._energy_value
-        if expr.op == "force":
-            return map_value(self.field.gradient(self._energy_value, expr.name), lambda q: q * FORCE)
-        inner = expr.args[0]
-        of = self.block(inner) if inner.op in {"force", "energy"} else self.field.value(inner)
-        return self.field.gradient(of, expr.name)
+        They may be unequal at the border of regions, as far as normal forms go, where no sign can be taken.
+        """
+        states = [evaluation.state for evaluation in self._everywhere]
+        left_over = [i for i, e in enumerate(self._floats) if not self._undefined_at(e, left, right)]
+        proved = False
+        for _ in range(_REGIONS):
+            if not left_over:
+                return proved
+            at = left_over[0]
+            if at not in self._regions:
+                field = Field(self.section, self.names, self.positive, here=states[at])
+                self._regions[at] = Blocks(field, self.energy)
+            if not self._regions[at].equal(left, right):
+                if self._regions[at].field.settles:
+                    return False
+                left_over = left_over[1:]
+                continue
+            proved = True
+            left_over = [i for i in left_over[1:] if not self._regions[at].field.holds_at(states[i])]
+        return False
 
     def is_zero(self, block: Expr) -> bool | None:
         """Whether a true block is zero everywhere; None if nothing could tell."""
@@ -158,17 +171,9 @@ class Court:
             except UndefinedError:
                 continue
         try:
-            return all(q.is_zero for q in flat(self.block(block)))
+            return all(q.is_zero for q in flat(self.forms.true(block)))
         except (UnsupportedError, ZeroDivisionError):
             return None
-
-    def normal(self, expr: Expr) -> Value:
-        return self.field.value(expr, self.block)
-
-    def _equal_normal(self, left: Expr, right: Expr) -> bool:
-        with self.field.claim():
-            pairs = _paired(left, right, flat(self.normal(left)), flat(self.normal(right)))
-        return all((p - q).is_zero for p, q in pairs)
 
     # -- second reading
 
@@ -185,7 +190,7 @@ class Court:
     @staticmethod
     def sides(evaluation: Evaluation, left: Expr, right: Expr) -> list[tuple[Any, Any]]:
         """Components of both sides at one state."""
-        return _paired(left, right, entries(evaluation.value(left)), entries(evaluation.value(right)))
+        return paired(left, right, entries(evaluation.value(left)), entries(evaluation.value(right)))
 
     @cached_property
     def wide(self) -> list[Evaluation]:
@@ -194,8 +199,12 @@ class Court:
         return [Evaluation(self.section, state, Rationals(seed), self.energy) for seed, state in enumerate(states)]
 
     @cached_property
+    def _everywhere(self) -> list[Evaluation]:
+        return [*self.exact, *self.wide]
+
+    @cached_property
     def _floats(self) -> list[Evaluation]:
-        return [in_floats(evaluation) for evaluation in (*self.exact, *self.wide)]
+        return [in_floats(evaluation) for evaluation in self._everywhere]
 
     @cached_property
     def _sides(self) -> dict[Expr, list[int]]:
@@ -222,7 +231,7 @@ class Court:
             return []
         chosen: dict[Any, Evaluation] = {}
         for keys in (sides, zip(sides, self._lies, strict=True)):
-            for key, evaluation in zip(keys, (*self.exact, *self.wide), strict=True):
+            for key, evaluation in zip(keys, self._everywhere, strict=True):
                 chosen.setdefault(key, evaluation)
         return list({id(evaluation): evaluation for evaluation in chosen.values()}.values())[:_SIDES]
 
@@ -253,9 +262,10 @@ class Court:
         return _Comparison(seen, tuple(differs), tuple(lacks_value))
 
     @staticmethod
-    def _undefined_at(evaluation: Evaluation, expr: Expr) -> bool:
+    def _undefined_at(evaluation: Evaluation, *trees: Expr) -> bool:
         try:
-            evaluation.value(expr)
+            for tree in trees:
+                evaluation.value(tree)
         except UndefinedError:
             return True
         return False
@@ -283,6 +293,18 @@ class Court:
         finally:
             flint.ctx.prec = before
         return None
+
+    @cached_property
+    def _balls(self) -> list[Evaluation]:
+        """Where what is proved is looked at once more, with true angles and pi."""
+        return [Evaluation(self.section, e.state, Balls(), self.energy) for e in self.exact[:_LOOKED_AT]]
+
+    def _apart(self, evaluation: Evaluation, left: Expr, right: Expr) -> bool:
+        with flint.ctx.workprec(_FEW_BITS[0]):
+            try:
+                return any(not a.overlaps(b) for a, b in self.sides(evaluation, left, right))
+            except UndefinedError:
+                return False
 
     @staticmethod
     def _lacks_value(evaluation: Evaluation, left: Expr, right: Expr) -> bool:
@@ -312,7 +334,7 @@ class Court:
         equal: bool | None
         unsupported = ""
         try:
-            equal = self._equal_normal(left, right)
+            equal = self.forms.equal(left, right)
         except UnsupportedError as error:
             equal, unsupported = None, str(error)
         except ZeroDivisionError:
@@ -324,9 +346,13 @@ class Court:
             if others:
                 compared = self._compare(left, right, others)
                 refuted = self._refuted(compared, left, right)
+        if refuted is None and equal is False and not compared.differs and not self.forms.field.settles:
+            equal = self._equal_in_regions(left, right)
         if refuted is not None and not (equal and refuted.witness is not None and refuted.witness.right):
             return refuted
         if equal and not compared.differs and compared.seen:
+            if any(self._apart(evaluation, left, right) for evaluation in self._balls):
+                return Finding(Verdict.INCONSISTENT, "equal in exact readings, apart in balls")
             return Finding(Verdict.PROVED)
         if not compared.seen and compared.lacks_value:
             at, why = compared.lacks_value[0]
@@ -343,7 +369,7 @@ class Court:
             return Finding(
                 Verdict.INCONSISTENT, "a denominator is zero as a normal form, and has a value at an exact state"
             )
-        if not compared.differs and not self.field.settles:
+        if not compared.differs and not self.forms.field.settles:
             return Finding(
                 Verdict.UNDECIDED, "equal at every exact state tried, but the square roots could not be settled"
             )
@@ -374,22 +400,9 @@ def undefined_symbols(missing: tuple[Name, ...]) -> Finding:
     return Finding(Verdict.REFUTED, f"undefined symbol {symbols}", undefined=missing)
 
 
-def _paired(left: Expr, right: Expr, a: list[Any], b: list[Any]) -> list[tuple[Any, Any]]:
-    """Components side by side; the printed 0 stands for as many zeros as are wanted."""
-    if is_zero(right):
-        b = b * len(a)
-    if is_zero(left):
-        a = a * len(b)
-    return list(zip(a, b, strict=True))
-
-
 def _spread(state: dict[Name, Any]) -> Fraction:
     """Sum of squared coordinates: small states are pleasant to read and to type in."""
     return sum(
         (part * part for value in state.values() for part in (value if isinstance(value, tuple) else (value,))),
         Fraction(0),
     )
-
-
-def flat(value: Value) -> list[Quotient]:
-    return [q for part in value for q in flat(part)] if isinstance(value, list) else [value]

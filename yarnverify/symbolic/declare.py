@@ -8,24 +8,40 @@ r"""Energies as a person declares them: one short file each, read aloud without 
         ...
 
 Arguments are the unknowns, keywords the parameters; the function returns a tree, so it uses ``+ - * /``, integer powers
-and the measures below, and no floats.
+and the functions of ``formulas``, and no floats. The domain may also be written in Python:
+``domain=lambda x0, x1, h: length(x1 - x0) < h``.
 """
 
 from __future__ import annotations
 
 import inspect
-import re
-import traceback
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import Any, Literal, get_type_hints
+from dataclasses import dataclass
+from typing import Any, Literal, NoReturn, get_type_hints, overload
 
 from yarnverify.errors import InputError
 from yarnverify.source import Source
-from yarnverify.symbolic.latex import ACCENTS
+from yarnverify.symbolic.energies import Assumption, Declarations, Energy, Motion, Parameter, Quantity, name_of
+from yarnverify.symbolic.formulas import (
+    angle,
+    arccos,
+    cos,
+    cross,
+    deviation,
+    dot,
+    exp,
+    length,
+    log,
+    sin,
+    sqrt,
+    square,
+    tan,
+    unit,
+)
+from yarnverify.symbolic.loading import load_declarations
+from yarnverify.symbolic.places import part_of, place_of
 from yarnverify.symbolic.reader import parse
-from yarnverify.symbolic.tree import PI, Expr, Name, ShapeError, Type, as_expr, type_of
+from yarnverify.symbolic.tree import PI, Expr, Inequality, Name, ShapeError, Type, as_expr, type_of
 
 
 class Point:
@@ -73,186 +89,41 @@ class Vector:
         return Real(unit, vector=True)
 
 
-def length(a: Expr) -> Expr:
-    """Length of a vector."""
-    return Expr("norm", (a,))
+_OPTIONS = ("q", "errors", "out", "threads", "engine")  # arguments that every kernel has
+_GEOMETRY = (
+    ("l", False),
+    ("d", True),
+    ("P", True),
+)  # what derivations call length, direction and projection of a segment
 
 
-def square(a: Expr) -> Expr:
-    """Square of the length of a vector."""
-    return Expr("mul", (a.T, a))
+def _fail(function: Callable[..., Any], part: str, message: str) -> NoReturn:
+    """One line for a mistake, at the part of the function where it was made."""
+    raise InputError(f"{function.__name__}: {message}", part_of(place_of(function), part))
 
 
-def unit(a: Expr) -> Expr:
-    """Direction of a vector."""
-    return Expr("frac", (a, length(a)))
-
-
-def angle(a: Expr, b: Expr) -> Expr:
-    """Angle between two directions, from 0 to pi."""
-    return Expr("call", (Expr("mul", (unit(a).T, unit(b))),), "arccos")
-
-
-def dot(a: Expr, b: Expr) -> Expr:
-    """Scalar product of two vectors."""
-    return Expr("mul", (a.T, b))
-
-
-def cross(a: Expr, b: Expr) -> Expr:
-    """Vector product."""
-    return Expr("cross", (a, b))
-
-
-def _function(name: str, what: str) -> Callable[[Expr | int], Expr]:
-    def function(value: Expr | int) -> Expr:
-        return Expr("sqrt", (as_expr(value),)) if name == "sqrt" else Expr("call", (as_expr(value),), name)
-
-    function.__name__, function.__doc__ = name, what
-    return function
-
-
-sqrt = _function("sqrt", "Square root of a scalar.")
-sin = _function("sin", "Sine of an angle in radians.")
-cos = _function("cos", "Cosine of an angle in radians.")
-tan = _function("tan", "Tangent of an angle in radians.")
-arccos = _function("arccos", "Angle from 0 to pi with a given cosine.")
-log = _function("log", "Natural logarithm of a positive scalar.")
-exp = _function("exp", "Exponential of a scalar.")
-
-
-def deviation(a: Expr, b: Expr) -> Expr:
-    """How much the angle between two directions exceeds a right angle, from -pi/2 to pi/2."""
-    return angle(a, b) - PI / 2
-
-
-@dataclass(frozen=True)
-class Parameter:
-    name: Name
-    unit: str
-    positive: bool
-
-    @property
-    def label(self) -> str:
-        """Its argument in a kernel, such as ``k_b``."""
-        return self.name.identifier
-
-
-@dataclass(frozen=True)
-class Assumption:
-    """``left > right``, in the notation of the document."""
-
-    left: Expr
-    right: Expr
-    strict: bool = True
-
-
-@dataclass(frozen=True)
-class Energy:
-    """A declared energy.
-
-    Attributes
-    ----------
-    name, document, section, unit, summary
-        What it is, and which section of which document prints it.
-    unknowns, units, parameters
-        In the order of the function's signature; ``units`` are those of the unknowns.
-    expression
-        The energy itself.
-    domain
-        Where it is meant; ``removable`` and ``singular`` are the states in which its derivatives need care, or are
-        undefined, in the notation of the document.
-    rest
-        One state of least energy: a value for each unknown (3 for a point), and 1 for each parameter not named.
-    elsewhere
-        What holds outside the domain: ``error``, or ``zero`` for an energy that does not act there.
-    unchanged
-        Motions that leave the energy as it is: ``translation``, ``rotation``, ``sliding`` (all sliding coordinates together).
-    place
-        File, line and column of its declaration.
-    """
-
-    name: str
-    document: str
-    section: str
-    unit: str
-    summary: str
-    unknowns: tuple[Name, ...]
-    units: tuple[str, ...]
-    parameters: tuple[Parameter, ...]
-    expression: Expr
-    domain: tuple[Assumption, ...] = ()
-    removable: str = ""
-    singular: str = ""
-    rest: dict[str, Any] = field(default_factory=dict)
-    elsewhere: str = "error"
-    unchanged: tuple[str, ...] = ()
-    place: tuple[str, int, int] = field(default=("", 1, 1), compare=False)
-
-    @property
-    def file(self) -> str:
-        """Name of the file that declares it."""
-        return Path(self.place[0]).name
-
-
-@dataclass(frozen=True)
-class Motion:
-    """A special motion that leaves an energy as it is: the rate of each unknown that moves; it may depend on the state."""
-
-    energy: str
-    name: str
-    summary: str
-    rates: tuple[tuple[Name, Expr], ...]
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A declared meaning of a symbol of the document; ``section`` is empty where it holds for all sections."""
-
-    symbol: Name
-    document: str
-    section: str
-    unit: str
-    expression: Expr
-    build: Callable[..., Expr] = field(compare=False)
-
-    def __call__(self, *args: Expr) -> Expr:
-        return self.build(*args)
-
-
-_INDEXED = re.compile(r"([A-Za-z]+?)_?(\d+|[ij])\Z")
-
-
-def name_of(identifier: str, bold: bool = False, indexed: bool = False) -> Name:
-    """The symbol that a Python identifier stands for: ``x1`` is x_1, ``k_b`` is k_b, ``bar_l`` is an l with a bar."""
-    if indexed and (match := _INDEXED.match(identifier)):
-        return Name(match[1], match[2], bold)
-    accent, _, rest = identifier.partition("_")
-    if accent in ACCENTS and rest:  # bar_l is \bar{l}
-        inner = name_of(rest, bold, indexed)
-        return replace(inner, base=f"{accent} {inner.base}")
-    base, _, sub = identifier.partition("_")
-    return Name(base, sub, bold)
-
-
-def place_of(function: Callable[..., Any]) -> tuple[str, int, int]:
-    """Where a function begins: its ``def``, below any decorators."""
-    code = function.__code__
+def _hints(function: Callable[..., Any]) -> dict[str, Any]:
+    """The annotations; a unit that lost its quotation marks is told as what it is."""
     try:
-        lines, first = inspect.getsourcelines(function)
-    except (OSError, TypeError):  # not from a file
-        return code.co_filename, code.co_firstlineno, 1
-    below = next((i for i, line in enumerate(lines) if line.lstrip().startswith("def ")), 0)
-    return code.co_filename, first + below, 1
+        return get_type_hints(function)
+    except (NameError, SyntaxError) as error:
+        text = " ".join(str(error).split())
+        _fail(function, "", f'an annotation cannot be read: {text}; units stand in quotation marks: Positive["N m^2"]')
 
 
 def _unknowns(function: Callable[..., Any], hints: dict[str, Any]) -> dict[str, Expr]:
-    found = {}
+    found: dict[str, Expr] = {}
     for key, parameter in inspect.signature(function).parameters.items():
         if parameter.kind is parameter.KEYWORD_ONLY:
             continue
+        if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
+            _fail(function, key, f"*{key} stands for nothing; name every unknown and every parameter")
         if hints.get(key) not in _KINDS:
-            raise TypeError(
-                f"argument {key!r} of {function.__name__} must be annotated Point or Sliding, Velocity or SlidingSpeed"
+            what = "a parameter goes behind the *" if isinstance(hints.get(key), Real) else "one of these is needed"
+            _fail(
+                function,
+                key,
+                f"argument {key!r} of {function.__name__} must be annotated Point or Sliding, Velocity or SlidingSpeed; {what}",
             )
         found[key] = Expr("symbol", value=name_of(key, _KINDS[hints[key]][0], indexed=True))
     return found
@@ -265,12 +136,30 @@ def _parameters(function: Callable[..., Any], hints: dict[str, Any]) -> dict[str
             continue
         kind = hints.get(key)
         if not isinstance(kind, Real):
-            raise TypeError(
+            what = "an unknown goes before the *" if kind in _KINDS else "a parameter has a unit, 1 for a plain number"
+            _fail(
+                function,
+                key,
                 f"parameter {key!r} of {function.__name__} must be annotated "
-                'Positive["unit"], Real["unit"] or Vector["unit"]'
+                f'Positive["unit"], Real["unit"] or Vector["unit"]; {what}',
             )
+        if not isinstance(kind.unit, str):
+            _fail(function, key, f'the unit of {key!r} must be a text such as "N m^2", not {kind.unit!r}')
         found[key] = Parameter(name_of(key, kind.vector), kind.unit, kind.positive)
     return found
+
+
+def _check_names(function: Callable[..., Any], names: dict[str, Name]) -> None:
+    """Refuse names that stand for one symbol, or for what a derivation or a kernel calls something else."""
+    seen: dict[str, str] = {}
+    for key, name in names.items():
+        if key in _OPTIONS:
+            _fail(function, key, f"{key!r} is taken: every kernel has an argument of this name; take another")
+        if name.sub and (name.base, name.bold) in _GEOMETRY:
+            _fail(function, key, f"{key!r} is taken: derivations call a segment's own {name} so; take another")
+        other = seen.setdefault(name.identifier, key)
+        if other != key:
+            _fail(function, key, f"{key!r} and {other!r} are one symbol, {name}; take another name for one of them")
 
 
 def assumptions(members: Iterable[Expr], operators: Iterable[str]) -> tuple[Assumption, ...]:
@@ -292,51 +181,129 @@ def assumptions(members: Iterable[Expr], operators: Iterable[str]) -> tuple[Assu
     return tuple(found)
 
 
-def _parsed(text: str, what: str) -> Any:
+def _domain(function: Callable[..., Any], domain: Any, symbols: dict[str, Expr]) -> tuple[Assumption, ...]:
+    """The inequalities of a domain, written in the notation of the document or as a function."""
+    if not callable(domain):
+        try:
+            relations = parse(Source("domain", domain), 0, len(domain)) if domain else ()
+        except InputError as error:
+            _fail(function, "domain", str(error))
+        return tuple(found for members, operators in relations for found in assumptions(members, operators))
+    wanted = inspect.signature(domain).parameters
+    for key in wanted:
+        if key not in symbols:
+            _fail(function, "domain", f"the domain has no {key!r} to use; there are {', '.join(symbols)}")
+    found = domain(**{key: symbols[key] for key in wanted})
+    inequalities = found if isinstance(found, list | tuple) else (found,)
+    for each in inequalities:
+        if not isinstance(each, Inequality):
+            _fail(function, "domain", "a domain gives an inequality such as u1 > u0, or a list of them")
+    return tuple(Assumption(each.left, each.right) for each in inequalities)
+
+
+def _check_rest(function: Callable[..., Any], rest: dict[str, Any], names: dict[str, Name]) -> None:
+    by_label = {name.label if name.bold or key == name.label else key: name for key, name in names.items()} | {
+        name.label: name for name in names.values()
+    }
+    for key, value in rest.items():
+        if key not in by_label:
+            _fail(function, "rest", f"rest has no use for {key!r}; there are {', '.join(names)}")
+        size = len(value) if isinstance(value, tuple | list) else 1
+        if size != (3 if by_label[key].bold else 1):
+            _fail(
+                function,
+                "rest",
+                f"rest: {key!r} takes {'three numbers' if by_label[key].bold else 'one number'}, not {value!r}",
+            )
+
+
+def _formula(function: Callable[..., Any], given: dict[str, Expr]) -> Expr:
+    """What a function of trees returns, which must be a scalar."""
+    found = function(**given)
+    if found is None:
+        _fail(function, "", "returns nothing; is the word return missing?")
     try:
-        return parse(Source(what, text), 0, len(text))
-    except InputError as error:
-        raise ValueError(str(error)) from None
+        expression = as_expr(found)
+        kind = type_of(expression, lambda symbol: Type.VECTOR if symbol.bold else Type.SCALAR)
+    except ShapeError as error:
+        _fail(function, "return", error.message)
+    except TypeError as error:
+        _fail(function, "return", str(error))
+    if kind is not Type.SCALAR:
+        _fail(
+            function,
+            "return",
+            f"an energy is a scalar, and this is a {kind.value}; length(a), square(a) and dot(a, b) are scalars",
+        )
+    return expression
 
 
+@overload
+def energy(function: Callable[..., Expr], /) -> Energy: ...
+
+
+@overload
 def energy(
     *,
     document: str = "",
     section: str = "",
     unit: str = "J",
-    domain: str = "",
+    domain: str | Callable[..., Any] = "",
     removable: str = "",
     singular: str = "",
     rest: dict[str, Any] | None = None,
     elsewhere: Literal["error", "zero"] = "error",
     unchanged: tuple[Literal["translation", "rotation", "sliding"], ...] = (),
-) -> Callable[[Callable[..., Expr]], Energy]:
-    """Declare an energy; see the module's example and ``Energy`` for what the options mean."""
+) -> Callable[[Callable[..., Expr]], Energy]: ...
+
+
+def energy(
+    function: Callable[..., Expr] | None = None,
+    /,
+    *,
+    document: str = "",
+    section: str = "",
+    unit: str = "J",
+    domain: str | Callable[..., Any] = "",
+    removable: str = "",
+    singular: str = "",
+    rest: dict[str, Any] | None = None,
+    elsewhere: Literal["error", "zero"] = "error",
+    unchanged: tuple[Literal["translation", "rotation", "sliding"], ...] = (),
+) -> Energy | Callable[[Callable[..., Expr]], Energy]:
+    """Declare an energy; see the module's example and ``Energy`` for what the options mean.
+
+    Raises
+    ------
+    InputError
+        For names, annotations, options and formulas that cannot be what they should be, with their place.
+    """
 
     def declare(function: Callable[..., Expr]) -> Energy:
-        hints = get_type_hints(function)
+        hints = _hints(function)
         unknowns, parameters = _unknowns(function, hints), _parameters(function, hints)
-        symbols = {key: Expr("symbol", value=parameter.name) for key, parameter in parameters.items()}
-        name = function.__name__
-        where: list[Assumption] = []
-        if domain:
-            for members, operators in _parsed(domain, f"domain of {name}"):
-                where += assumptions(members, operators)
-        expression = as_expr(function(**unknowns, **symbols))
-        try:
-            kind = type_of(expression, lambda symbol: Type.VECTOR if symbol.bold else Type.SCALAR)
-        except ShapeError as error:
-            raise TypeError(f"{name}: {error.message}") from None
-        if kind is not Type.SCALAR:
-            raise TypeError(f"{name}: an energy is a scalar, and this is a {kind.value}")
+        symbols = unknowns | {key: Expr("symbol", value=parameter.name) for key, parameter in parameters.items()}
+        names = {key: symbol.name for key, symbol in symbols.items()}
+        _check_names(function, names)
+        if not unknowns:
+            _fail(function, "", "has no unknown; name a Point or a Sliding before the *")
+        if elsewhere not in ("error", "zero"):
+            _fail(function, "elsewhere", f"elsewhere is 'error' or 'zero', not {elsewhere!r}")
+        motions = ("translation", "rotation", "sliding")
+        if isinstance(unchanged, str) or any(motion not in motions for motion in unchanged):
+            _fail(function, "unchanged", f"unchanged takes a tuple of {', '.join(motions)}, not {unchanged!r}")
+        where = _domain(function, domain, symbols)
+        if elsewhere == "zero" and len(where) != 1:
+            _fail(function, "elsewhere", f"elsewhere='zero' needs a domain of one inequality; there are {len(where)}")
+        _check_rest(function, rest or {}, names)
         return Energy(
-            name, document, section, unit, inspect.getdoc(function) or "",
+            function.__name__, document, section, unit, inspect.getdoc(function) or "",
             tuple(node.name for node in unknowns.values()), tuple(_KINDS[hints[key]][1] for key in unknowns),
-            tuple(parameters.values()),
-            expression, tuple(where), removable, singular, rest or {}, elsewhere, unchanged, place_of(function),
+            tuple(parameters.values()), _formula(function, symbols),
+            where, removable, singular, rest or {}, elsewhere, unchanged, place_of(function),
         )  # fmt: skip
 
-    return declare
+    return declare if function is None else declare(function)
 
 
 def quantity(
@@ -345,11 +312,14 @@ def quantity(
     """Declare what a symbol of the document means; an argument such as ``x_i`` carries the running index."""
 
     def declare(function: Callable[..., Expr]) -> Quantity:
-        hints = get_type_hints(function)
-        relations = _parsed(symbol, f"symbol of {function.__name__}")
+        hints = _hints(function)
+        try:
+            relations = parse(Source("symbol", symbol), 0, len(symbol))
+        except InputError as error:
+            _fail(function, "symbol", str(error))
         members, operators = relations[0]
         if len(relations) > 1 or operators or members[0].op != "symbol":
-            raise ValueError(f"symbol of {function.__name__} must be one symbol, not {symbol!r}")
+            _fail(function, "symbol", f"symbol must be one symbol such as \\theta, not {symbol!r}")
         return Quantity(members[0].name, document, section, unit, function(**_unknowns(function, hints)), function)
 
     return declare
@@ -360,56 +330,13 @@ def unchanged_by(energy: Energy) -> Callable[[Callable[..., dict[str, Expr | int
 
     def declare(function: Callable[..., dict[str, Expr | int]]) -> Motion:
         labels = {name.label: name for name in energy.unknowns}
-        rates = function(**_unknowns(function, get_type_hints(function)))
+        rates = function(**_unknowns(function, _hints(function)))
         if strange := set(rates) - set(labels):
-            raise ValueError(f"{function.__name__}: {energy.name} has no unknown {', '.join(sorted(strange))}")
+            _fail(function, "return", f"{energy.name} has no unknown {', '.join(sorted(strange))}")
         moves = tuple((labels[label], as_expr(rate)) for label, rate in rates.items())
         return Motion(energy.name, function.__name__.replace("_", " "), inspect.getdoc(function) or "", moves)
 
     return declare
-
-
-@dataclass(frozen=True)
-class Declarations:
-    """All that one folder of derivations declares."""
-
-    energies: tuple[Energy, ...] = ()
-    quantities: tuple[Quantity, ...] = ()
-    motions: tuple[Motion, ...] = ()
-
-
-def load_declarations(folder: Path) -> Declarations:
-    """Run the Python files of a folder, in alphabetical order, and collect what they declare.
-
-    Raises
-    ------
-    InputError
-        Where a file does not run.
-    """
-    energies: dict[str, Energy] = {}
-    quantities: list[Quantity] = []
-    motions: list[Motion] = []
-    for path in sorted(path for path in folder.glob("*.py") if path.is_file()):
-        namespace: dict[str, Any] = {"__name__": path.stem, "__file__": str(path)}
-        try:
-            exec(compile(path.read_bytes(), str(path), "exec"), namespace)
-        except SyntaxError as error:
-            raise InputError(error.msg, (str(path), error.lineno or 1, error.offset or 1)) from None
-        except Exception as error:
-            frames = traceback.extract_tb(error.__traceback__)
-            lines = [frame.lineno for frame in frames if frame.filename == str(path) and frame.lineno]
-            place = (str(path), lines[-1] if lines else 1, 1)
-            raise InputError(f"{type(error).__name__}: {error}", place) from None
-        for value in namespace.values():
-            if isinstance(value, Energy):
-                if energies.get(value.name, value) is not value:
-                    raise InputError(f"energy {value.name!r} is declared twice", (str(path), 1, 1))
-                energies[value.name] = value
-            elif isinstance(value, Quantity):
-                quantities.append(value)
-            elif isinstance(value, Motion):
-                motions.append(value)
-    return Declarations(tuple(energies.values()), tuple(quantities), tuple(motions))
 
 
 __all__ = [

@@ -19,7 +19,7 @@ from yarnverify.symbolic.document import Definition, Section, block_of
 from yarnverify.symbolic.laws import Law
 from yarnverify.symbolic.measures import Measure, NoMeasuresError, Segment, differentiate, scalar_symbol
 from yarnverify.symbolic.reader import Relation
-from yarnverify.symbolic.scalars import scalar_tree, sum_tree
+from yarnverify.symbolic.scalars import Order, by_index, scalar_tree, sum_tree
 from yarnverify.symbolic.tree import FORCE, IDENTITY, Expr, Name
 
 _NOWHERE = Relation((), (), "", 0, True)
@@ -27,13 +27,17 @@ _NOWHERE = Relation((), (), "", 0, True)
 
 @dataclass(frozen=True)
 class Derivation:
-    """Measures, law, and derivatives of an energy. ``section`` defines the symbols that the blocks are written in."""
+    """Measures, law, and derivatives of an energy.
+
+    ``section`` defines the symbols that the blocks are written in, ``order`` how differences of them stand.
+    """
 
     section: Section
     energy: Expr
     law: Any
     measures: tuple[Measure, ...]
     unknowns: tuple[Name, ...]
+    order: Order = by_index
 
     @cached_property
     def slopes(self) -> dict[Measure, Any]:
@@ -50,14 +54,14 @@ class Derivation:
     def gradient(self, unknown: Name, scale: int = 1) -> Expr:
         """Gradient block: a vector for a point, a scalar for a sliding coordinate."""
         if not unknown.bold:
-            return sum_tree([(scale * differentiate(self.law, scalar_symbol(unknown)), ())])
+            return sum_tree([(scale * differentiate(self.law, scalar_symbol(unknown)), ())], self.order)
         if self._is_hub(unknown):
             return _minus_sum([Expr("force", value=other) for other in self._others(unknown)])
         terms = []
         for measure in self.measures:
             for value, factors in self._measure_slope(measure, unknown):
                 terms.append((scale * self.slopes[measure] * value, factors))
-        return sum_tree(terms)
+        return sum_tree(terms, self.order)
 
     def hessian(self, row: Name, column: Name, scale: int = 1) -> Expr:
         """Hessian block; rows belong to ``row``."""
@@ -66,7 +70,9 @@ class Derivation:
                 pairs = [(o, column) if unknown == row else (row, o) for o in self._others(unknown)]
                 return _minus_sum([Expr("derivative", (Expr("force", value=r),), c) for r, c in pairs])
         if not row.bold and not column.bold:
-            return sum_tree([(scale * differentiate(self.law, scalar_symbol(row), scalar_symbol(column)), ())])
+            return sum_tree(
+                [(scale * differentiate(self.law, scalar_symbol(row), scalar_symbol(column)), ())], self.order
+            )
         if not (row.bold and column.bold):
             point, sliding = (row, column) if row.bold else (column, row)
             terms = []
@@ -74,7 +80,7 @@ class Derivation:
                 mixed = differentiate(self.slopes[measure], scalar_symbol(sliding))
                 for value, factors in self._measure_slope(measure, point):
                     terms.append((scale * mixed * value, factors if row.bold else _transposed(factors)))
-            return sum_tree(terms)
+            return sum_tree(terms, self.order)
         terms = []
         for measure in self.measures:
             for a in measure.segments:
@@ -87,7 +93,7 @@ class Derivation:
                 for value, left in self._measure_slope(measure, row):
                     for value2, right in self._measure_slope(other, column):
                         terms.append((scale * second * value * value2, (*left, *_transposed(right))))
-        return sum_tree(terms)
+        return sum_tree(terms, self.order)
 
     @cached_property
     def _segments(self) -> tuple[Segment, ...]:
@@ -113,7 +119,7 @@ class Derivation:
     @property
     def law_tree(self) -> Expr:
         """The energy in terms of its measures."""
-        return scalar_tree(sp.factor(self.law))
+        return scalar_tree(sp.factor(self.law), self.order)
 
     def blocks(self, scale: int) -> Iterable[tuple[tuple[Expr, Expr], list[tuple[Expr, Expr]]]]:
         """For each unknown its gradient block and its Hessian blocks, each times ``scale``, as (name, tree)."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from fractions import Fraction
 from typing import Any, TypeAlias
 
-from yarnverify.symbolic.declare import Energy
+from yarnverify.symbolic.energies import Energy
 from yarnverify.symbolic.latex import latex
 from yarnverify.symbolic.tree import Expr, Name, is_zero
 
@@ -40,10 +40,14 @@ def dimension_of_unit(unit: str) -> Dimension:
     """
     total = NUMBER
     for factor in unit.split():
-        found = _FACTOR.match(factor)
-        if found is None or found[1] not in _UNITS:
-            raise DimensionError(f"unknown unit {factor!r}; known are {', '.join(_UNITS)} and whole powers of them")
-        total = _times(total, _UNITS[found[1]], int(found[2] or 1))
+        above, *below = factor.split("/")  # N/m is N m^-1
+        for text, sign in ((above, 1), *((each, -1) for each in below)):
+            found = _FACTOR.match(text)
+            if found is None or found[1] not in _UNITS:
+                raise DimensionError(
+                    f"unknown unit {text!r}; known are {', '.join(_UNITS)} and whole powers, as in N m^-2"
+                )
+            total = _times(total, _UNITS[found[1]], sign * int(found[2] or 1))
     return total
 
 
@@ -121,7 +125,9 @@ def _common(terms: Iterable[Expr], dimensions: list[Dimension]) -> Dimension:
     (first, wanted), *rest = settled
     for term, found in rest:
         if found != wanted:
-            raise DimensionError(f"{latex(first)} is in {unit_text(wanted)}, {latex(term)} in {unit_text(found)}")
+            raise DimensionError(
+                f"{latex(first)} is in {unit_text(wanted)}, {latex(term)} in {unit_text(found)}: no sum of these"
+            )
     return wanted
 
 

@@ -252,7 +252,9 @@ def length_checks(energy: Energy, section: Section, reading: Components, more: s
 
 def zero_length(ends: Iterable[Name], more: str = "") -> str:
     """What is wrong with a segment without length."""
-    return f"the segment {'-'.join(sorted(n.label for n in ends))} has length zero{more}"
+    labels = sorted({n.label for n in ends})
+    what = f"segment {'-'.join(labels)}" if len(labels) == 2 else f"vector made of {', '.join(labels)}"
+    return f"the {what} has length zero{more}"
 
 
 def domain_checks(energy: Energy, reading: Components) -> Iterable[Check]:

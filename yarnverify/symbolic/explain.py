@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from yarnverify.symbolic.invariants import prove_invariants
 from yarnverify.symbolic.latex import latex, name_latex
 from yarnverify.symbolic.measures import Measure, Segment
 from yarnverify.symbolic.plain import name_plain, plain
-from yarnverify.symbolic.scalars import scalar_tree, sum_tree
+from yarnverify.symbolic.scalars import origin_last, scalar_tree, sum_tree
 from yarnverify.symbolic.sums import Stages, is_rational
 from yarnverify.symbolic.tree import FORCE, Expr, Name
 
@@ -44,6 +45,8 @@ def explain_energy(energy: Energy, declarations: Declarations) -> dict[str, Any]
     derivation = derive_declared(energy, declarations.quantities)
     steps = [_declared(energy)]
     proved: dict[str, str]
+    if derivation is not None:
+        derivation = replace(derivation, order=origin_last)
     if derivation is None:
         steps += _plain_steps(energy)
         proved = _plain_proofs(energy)
@@ -114,10 +117,12 @@ def _law(derivation: Derivation) -> Step:
     names = [m.symbol for m in derivation.measures] + [n for n in derivation.unknowns if not n.bold]
     formulas = [_equal(("V", "V"), derivation.law_tree)]
     for name in names:
-        formulas.append(_equal(_by(("V", "V"), name), scalar_tree(derivation.law_slope(name))))
+        formulas.append(_equal(_by(("V", "V"), name), scalar_tree(derivation.law_slope(name), origin_last)))
     for i, first in enumerate(names):
         for second in names[i:]:
-            formulas.append(_equal(_by(("V", "V"), first, second), scalar_tree(derivation.law_slope(first, second))))
+            formulas.append(
+                _equal(_by(("V", "V"), first, second), scalar_tree(derivation.law_slope(first, second), origin_last))
+            )
     return _step(
         "Law", "The energy as a function of its measures and sliding coordinates, and its derivatives.", formulas
     )

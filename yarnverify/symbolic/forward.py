@@ -4,13 +4,13 @@ Independent of the first reading: no SymPy, no normal forms, no formula for any 
 its gradient and Hessian by all unknowns at one state; the energy's own definition is evaluated in jets. Over rationals the
 state is chosen so that lengths and sines come out rational (square roots that do not are adjoined exactly); an angle is
 replaced by a rational number drawn for its cosine, and pi by another, since an identity of functions holds whatever their
-values (an arc cosine of what varies is no algebraic function; relations between several, such as arccos(2 c^2 - 1) =
-2 arccos(c), are not seen). Two sides that differ there differ as functions up to bad luck,
-which the balls, with true angles and pi, then exclude.
+values (an arc cosine of what varies is no algebraic function; where several hang together, only one is drawn). Two sides that
+differ there differ as functions up to bad luck, which the balls, with true angles and pi, then exclude.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from fractions import Fraction
 from functools import cached_property
@@ -19,11 +19,15 @@ from typing import Any
 import flint
 import numpy as np
 
+from yarnverify.symbolic.algebraic import Algebraic, Number, UndefinedError
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.exponentials import NAMES
+from yarnverify.symbolic.functions import unfolded
 from yarnverify.symbolic.jets import Jet
-from yarnverify.symbolic.numbers import Algebraic, Balls, Floats, Number, UndefinedError
-from yarnverify.symbolic.tree import FORCE, ZERO, Expr, Name
+from yarnverify.symbolic.linear import linear_form, tree_of
+from yarnverify.symbolic.numbers import Balls, Floats
+from yarnverify.symbolic.tree import FORCE, PI, ZERO, Expr, Name
+from yarnverify.symbolic.turns import DRAWN_PARTS, Pair, multiple, of_pi, scaled, turned
 
 State = Mapping[Name, Any]  # a Fraction for a scalar, three for a point
 
@@ -140,6 +144,8 @@ class Evaluation:
             return np.array([[constant(Fraction(int(i == j))) for j in range(3)] for i in range(3)], dtype=object)
         if op == "call" and expr.value in NAMES:
             return self._exponential(str(expr.value), self._value(expr.args[0], jets))
+        if op == "call" and (plain := unfolded(expr)) is not None:
+            return self._value(plain, jets)
         if op == "call" and expr.value != "arccos":
             sine, cosine = self._circle(expr.args[0], jets)
             return {"sin": lambda: sine, "cos": lambda: cosine, "tan": lambda: sine / _nonzero(cosine)}[
@@ -243,85 +249,39 @@ class Evaluation:
             result = result * square
         return result
 
-    def _circle(self, expr: Expr, jets: bool) -> tuple[Any, Any]:
-        """Sine and cosine; over rationals an angle is recognised as ``n arccos(c)/2 + m pi/2``."""
+    def _circle(self, expr: Expr, jets: bool) -> Pair:
+        """Sine and cosine; over rationals by the parts of the angle, so that what hangs together is seen to."""
         if not self.numbers.exact:
             value = self._value(expr, jets)
             sine, cosine = self.numbers.circle(Jet._lift(value).value)
             return self._circle_pair(value, sine, cosine)
-        form = self._angle_form(expr, jets)
-        quarters = form.pop("pi", Fraction(0)) * 2 if form is not None else Fraction(1, 3)
-        halves = next(iter(form.values()))[0] * 2 if form else Fraction(0)
-        if form is None or len(form) > 1 or quarters.denominator != 1 or halves.denominator != 1:
-            value = self._value(expr, jets)
-            sine, cosine = self.numbers.circle(Jet._lift(value).value)
-            return self._circle_pair(value, sine, cosine)
-        one, zero = self.numbers.constant(Fraction(1)), self._zero
-        sine, cosine = zero, one
-        for _, c in form.values():
-            if halves % 2:
-                s, sine_of_whole = self._sqrt((1 - c) / 2), self._sqrt(1 - c * c)
-                c = sine_of_whole / (2 * s)
-                times = int(halves)
-            else:
-                s, times = self._sqrt(1 - c * c), int(halves) // 2
-            for _ in range(abs(times)):
-                turn = s if times > 0 else -s
-                sine, cosine = sine * c + cosine * turn, cosine * c - sine * turn
-        for _ in range(int(quarters) % 4):
-            sine, cosine = cosine, -sine
-        return sine, cosine
+        one = self.numbers.constant(Fraction(1))
+        total: Pair = self._zero, one
+        for monomial, factor in linear_form(expr, self.section.meaning).items():
+            total = turned(total, self._turn(tree_of(monomial), factor, one, jets))
+        return total
+
+    def _turn(self, angle: Expr, factor: Fraction, one: Number, jets: bool) -> Pair:
+        """The point of the unit circle of a multiple of an angle that is no sum."""
+        pair = None
+        if angle == PI:
+            pair = of_pi(factor, one, self.numbers.sqrt)
+        elif angle.op == "call" and angle.value == "arccos":
+            cosine = self._value(angle.args[0], jets)
+            self.numbers.arccos(Jet._lift(cosine).value)
+            pair = scaled((self._sqrt(1 - cosine * cosine), cosine), factor, one, self._sqrt)
+        if pair is not None:
+            return pair
+        below = factor.denominator // math.gcd(factor.denominator, DRAWN_PARTS)
+        drawn = self._value(angle, jets) / (DRAWN_PARTS * below)
+        sine, cosine = self.numbers.circle(Jet._lift(drawn).value)
+        return multiple(self._circle_pair(drawn, sine, cosine), int(factor * DRAWN_PARTS * below), one)
 
     @staticmethod
-    def _circle_pair(value: Any, sine: Number, cosine: Number) -> tuple[Any, Any]:
+    def _circle_pair(value: Any, sine: Number, cosine: Number) -> Pair:
         if not isinstance(value, Jet):
             return sine, cosine
         return value.chain(sine, cosine, -sine), value.chain(cosine, -sine, -cosine)
-
-    def _angle_form(self, expr: Expr, jets: bool) -> dict[Any, Any] | None:
-        """``{cosine: (factor, cosine value), "pi": factor}`` of a linear combination of angles, else None."""
-        op = expr.op
-        if op == "symbol":
-            meaning = self.section.meaning(expr.name)
-            return None if meaning is None else self._angle_form(meaning, jets)
-        if op == "pi":
-            return {"pi": Fraction(1)}
-        if op == "call" and expr.value == "arccos":
-            cosine = self._value(expr.args[0], jets)
-            value = Jet._lift(cosine).value
-            self.numbers.arccos(value)
-            if self.numbers.knows_angle(value):
-                return {value: (Fraction(1), cosine)}
-            return {"pi": Fraction(1), -value: (Fraction(-1), -cosine)}  # so that arccos(c) and arccos(-c) share a base
-        if op == "number" and expr.value == 0:
-            return {}
-        scale = Fraction(1)
-        parts = expr.args
-        if op == "neg":
-            scale = Fraction(-1)
-        elif op in {"frac", "mul"}:
-            numbers = [
-                p for p in expr.args if p.op == "number" or (p.op == "frac" and all(a.op == "number" for a in p.args))
-            ]
-            parts = tuple(p for p in expr.args if p not in numbers)
-            if len(parts) != 1 or (op == "frac" and parts[0] is not expr.args[0]):
-                return None
-            for p in numbers:
-                value = Fraction(p.value) if p.op == "number" else Fraction(p.args[0].value) / Fraction(p.args[1].value)  # type: ignore[arg-type]
-                scale = scale / value if op == "frac" else scale * value
-        elif op != "add":
-            return None
-        total: dict[Any, Any] = {}
-        for part in parts:
-            form = self._angle_form(part, jets)
-            if form is None:
-                return None
-            for key, item in form.items():
-                if key == "pi":
-                    total[key] = total.get(key, Fraction(0)) + item * scale
-                else:
-                    total[key] = (total.get(key, (Fraction(0),))[0] + item[0] * scale, item[1])
-        return {key: item for key, item in total.items() if key == "pi" or item[0]}
 
 
 def _nonzero(value: Any) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from yarnverify.symbolic.numbers import Number, UndefinedError
+from yarnverify.symbolic.algebraic import Number, UndefinedError
 
 
 @lru_cache(maxsize=64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from yarnverify.symbolic.functions import OF_TWO
 from yarnverify.symbolic.tree import Expr, Name
 
 # The vocabulary that the grammar reads.
@@ -11,7 +12,6 @@ GREEK = (
     "Lambda", "Xi", "Sigma", "Upsilon", "Phi", "Psi", "Omega",
 )  # fmt: skip
 ACCENTS = ("bar", "hat", "tilde")
-FUNCTIONS = ("sin", "cos", "tan", "arccos")
 
 _ATOMS = {"number", "symbol", "force", "energy", "pi", "identity", "norm", "abs", "sqrt", "frac", "derivative"}
 
@@ -61,6 +61,8 @@ def _bare(expr: Expr) -> bool:
 
 
 def _call(expr: Expr, power: str = "") -> str:
+    if expr.value in OF_TWO:
+        return f"\\operatorname{{{expr.value}}}\\left( {', '.join(map(latex, expr.args))} \\right)"
     arg = expr.args[0]
     name = "ln" if expr.value == "log" else expr.value
     return f"\\{name}{power} {latex(arg) if _bare(arg) else _group(arg)}"
@@ -112,7 +114,9 @@ def latex(expr: Expr) -> str:
             return f"\\frac{{{latex(args[0])}}}{{{latex(args[1])}}}"
         case "pow":
             exponent = f"^{expr.value}" if len(str(expr.value)) == 1 else f"^{{{expr.value}}}"
-            if args[0].op == "call" and len(str(expr.value)) == 1:  # sin^{-1} would be read as the inverse function
+            if (
+                args[0].op == "call" and args[0].value not in OF_TWO and len(str(expr.value)) == 1
+            ):  # sin^{-1} would be read as the inverse function
                 return _call(args[0], exponent)
             return _atom(args[0]) + exponent
         case "transpose":

@@ -7,8 +7,16 @@ from typing import Any
 import sympy as sp
 
 from yarnverify.symbolic.document import Section
+from yarnverify.symbolic.functions import unfolded
 from yarnverify.symbolic.measures import Measure, NoMeasuresError, Segment, scalar_name, scalar_symbol
 from yarnverify.symbolic.tree import Expr, Name
+
+
+class exponential(sp.Function):  # type: ignore[misc]
+    """An exponential that SymPy does not open: ``exp(a + b)`` stays what it is."""
+
+    def fdiff(self, argindex: int = 1) -> Any:
+        return self
 
 
 class Law:
@@ -51,9 +59,14 @@ class Law:
                     scale, segment = self.vector(args[0])
                     return self._absolute(scale) * self._length(segment)
             case "call":
+                plain = unfolded(expr)
+                if plain is not None:
+                    return self.scalar(plain)
                 if expr.value == "arccos":
                     return self._angle(args[0])
-                function = {"sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "log": sp.log, "exp": sp.exp}[str(expr.value)]
+                function = {"sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "log": sp.log, "exp": exponential}[
+                    str(expr.value)
+                ]
                 return function(self.scalar(args[0]))
         raise NoMeasuresError
 

@@ -11,13 +11,13 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from yarnverify.errors import InputError, NotRunError
+from yarnverify.errors import NotRunError
 from yarnverify.source import load
 from yarnverify.symbolic.angles import prove_derivatives, prove_recurrence, turning_series
 from yarnverify.symbolic.court import Court, Finding, Verdict
 from yarnverify.symbolic.declare import Declarations, Energy, load_declarations
 from yarnverify.symbolic.derive import Derivation, declared_section, derive_declared
-from yarnverify.symbolic.dimensions import DimensionError, check_dimensions, dimension_of_unit
+from yarnverify.symbolic.dimensions import dimension_of_unit
 from yarnverify.symbolic.document import Claim, Document, Section, block_of
 from yarnverify.symbolic.emit import (
     LIBRARY,
@@ -110,10 +110,6 @@ def kernel_modules(
     record: dict[str, Any] = {}
     missing: list[str] = []
     for energy in energies:
-        try:
-            check_dimensions(energy)
-        except DimensionError as error:
-            raise InputError(f"{energy.name}: {error}", energy.place) from None
         derived = proved(energy, declarations)
         for variant in variants_of(energy):
             advance(f"{energy.name}, {variant}", len(planned))
@@ -127,9 +123,14 @@ def kernel_modules(
                 programs = [made]
             else:
                 programs, notes = derived_programs(energy, derived, variant)
+            if variant == "reference" and (called := library_calls(programs)):
+                missing.append(
+                    f"{energy.name}: no variant in twice the digits: there is no {' and no '.join(called)} in these"
+                )
+                continue
             sources = [energy.file, *([document] if variant == "printed" else [])]
             place = "derivations/" if package else ""
-            text, counts = module_text(energy, variant, programs, [place + name for name in sources], notes)
+            text, counts = module_text(energy, variant, programs, [place + name for name in sources], notes, derived)
             texts[f"{variant}/{energy.name}.py"] = text
             record.setdefault(energy.name, {})[variant] = counts
         texts[f"{energy.name}.py"] = _face(energy, default, package)
@@ -205,7 +206,10 @@ def derived_programs(energy: Energy, found: Proved, variant: str) -> tuple[list[
         return [found.stages.program()], [_PLAIN_SUMS] if variant == "accurate" else []
     if found.derivation is None:
         note = "this energy is no law of known measures: plain differentiation, nothing is done for its singular states"
-        return [plain_program(energy, declared_section(energy))], [note]
+        section = declared_section(energy)
+        return [plain_program(energy, section) if variant == "differentiated" else Stages(energy, section).program()], [
+            note
+        ]
     if variant == "differentiated":
         return [derived_program(energy, found.derivation)], []
     if not found.shapes:
@@ -310,7 +314,7 @@ def _title(energy: Energy) -> str:
 
 
 def module_text(
-    energy: Energy, variant: str, programs: list[Program], sources: list[str], notes: list[str]
+    energy: Energy, variant: str, programs: list[Program], sources: list[str], notes: list[str], found: Proved
 ) -> tuple[str, dict[str, int]]:
     """The text of one kernel module, and its operation counts."""
     dofs = dof_labels(energy.unknowns)
@@ -350,6 +354,7 @@ def module_text(
         "functions": functions,
         "scaling": "points" if angles_alone else "lengths",
         "portable": not LIBRARY & set(tape),
+        "promise": promise(variant, found, bool(LIBRARY & set(tape))),
         "numbers": "double-double" if variant == "reference" else "float",
         "public": (
             ("energy", "(n,)", "Energy of each element", energy.unit, "Array"),
@@ -373,6 +378,32 @@ def module_text(
         for shape, found in counts.items()
     )
     return template.render(counts=shown, **values), next(iter(counts.values()))
+
+
+def library_calls(programs: list[Program]) -> list[str]:
+    """The functions of a mathematical library that programs call."""
+    code = "\n".join(line for made in programs for line in (*statements(made), *map(text_of, made.outputs)))
+    return sorted(LIBRARY & set(used_functions(code, "tape")))
+
+
+def promise(variant: str, found: Proved, calls: bool) -> str:
+    """What errors a kernel promises; see ``runtime.Kernel``."""
+    if variant in ("differentiated", "printed") or calls or not (found.shapes or found.stages):
+        return "none"
+    if variant == "reference":
+        return "units"
+    compares = any(_compares_angles(shape) for shape in found.shapes)
+    return "units" if variant == "accurate" and found.shapes and not compares else "condition"
+
+
+def _compares_angles(shape: Safe) -> bool:
+    """Whether a law adds something to its angle, such as an angle of rest, so that digits of both cancel."""
+    corner = shape.corner
+    if corner is None:
+        return False
+    own = {name for name in shape.given if not name.bold} - {corner.a.l.name, corner.b.l.name}
+    sums = (node for node in shape.law.walk() if node.op == "add")
+    return any(part.op == "symbol" and part.name in own for node in sums for part in node.walk())
 
 
 def _operations(text: str, name: str) -> dict[str, dict[str, int]]:

@@ -56,7 +56,7 @@ def plain(expr: Expr) -> str:
         case "pow":
             inner = _wrap(args[0], {"add", "neg", "mul", "frac", "pow", "derivative"})
             exponent = str(expr.value).translate(_SUPERSCRIPT)
-            if args[0].op == "call":
+            if args[0].op == "call" and len(args[0].args) == 1:
                 return f"{args[0].value}{exponent} {_wrap(args[0].args[0], {'add', 'neg', 'mul', 'frac'})}"
             return inner + exponent
         case "transpose":
@@ -66,6 +66,8 @@ def plain(expr: Expr) -> str:
         case "sqrt":
             return f"√({plain(args[0])})"
         case "call":
+            if len(args) > 1:
+                return f"{expr.value}({', '.join(map(plain, args))})"
             return f"{expr.value} {_wrap(args[0], {'add', 'neg', 'mul', 'frac', 'dot', 'transpose'})}"
         case "cross" | "dot":
             sign = "×" if expr.op == "cross" else "·"

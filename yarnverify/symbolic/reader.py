@@ -337,6 +337,9 @@ class _Build(Transformer[Token, Any]):
     def call_power(self, meta: Meta, items: list[Any]) -> Expr:
         return self._node(meta, "pow", self.call(meta, [items[0], items[2]]), value=int(items[1][-1]))
 
+    def call_of_two(self, meta: Meta, items: list[Any]) -> Expr:
+        return self._node(meta, "call", items[2], items[3], value="atan2")
+
     def symbol(self, meta: Meta, items: list[Any]) -> Expr:
         letter, sub = items
         name = replace(letter, sub=sub.label if isinstance(sub, Name) else sub or "")

@@ -11,6 +11,7 @@ from typing import Any
 
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.exponentials import NAMES
+from yarnverify.symbolic.functions import unfolded
 from yarnverify.symbolic.tree import Expr, Name
 
 Value = Any
@@ -84,6 +85,8 @@ class Reading(ABC):
             return blocks(expr)
         if op == "symbol":
             return self.symbol(expr.name)
+        if op == "call" and (plain := unfolded(expr)) is not None:
+            return self.value(plain, blocks)
         values = [self.value(arg, blocks) for arg in args]
         match op:
             case "number":

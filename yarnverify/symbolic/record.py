@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -11,18 +12,22 @@ from typing import Any
 import flint
 import numpy as np
 
+from yarnverify.errors import InputError
 from yarnverify.library import Shelf
 from yarnverify.source import Source
+from yarnverify.symbolic.algebraic import UndefinedError
 from yarnverify.symbolic.court import Verdict
 from yarnverify.symbolic.declare import Declarations, load_declarations
 from yarnverify.symbolic.derive import derive
-from yarnverify.symbolic.document import Section, block_of, instantiate
+from yarnverify.symbolic.document import Document, Section, block_of, instantiate
 from yarnverify.symbolic.forward import Evaluation, entries
 from yarnverify.symbolic.latex import latex
-from yarnverify.symbolic.numbers import Balls, UndefinedError
+from yarnverify.symbolic.numbers import Balls
+from yarnverify.symbolic.places import part_of
 from yarnverify.symbolic.prove import Completeness, Judged, Trial, read_with, try_document
 from yarnverify.symbolic.repair import Repair, Workshop, chain_latex, describe
-from yarnverify.symbolic.tree import FORCE, Expr, Name
+from yarnverify.symbolic.scalars import origin_last
+from yarnverify.symbolic.tree import FORCE, Expr, Name, rebuild
 
 SCHEMA = 1
 _ASIDE = Fraction(1, 2**20)  # how far from rest a formula is evaluated that is 0/0 at rest
@@ -49,9 +54,23 @@ def prove_source(
         tuple(q for q in declarations.quantities if q.document == shelf.document),
     )
     document = read_with(source, declarations)
+    if Path(source.name).name == shelf.document:  # an edition under another name may leave sections out
+        _require_sections(document, declarations)
     total = sum(len(section.claims) + 1 for section in document.sections) + len(document.shared.definitions)
     trial = try_document(document, declarations, lambda equation: advance(f"equation ({equation})", total))
     return describe_trial(trial, shelf)
+
+
+def _require_sections(document: Document, declarations: Declarations) -> None:
+    """Refuse an energy that names a section which its document does not have."""
+    titles = {section.title.casefold(): section.title for section in document.sections}
+    for energy in declarations.energies:
+        if energy.section.casefold() not in titles:
+            there = ", ".join(repr(title) for title in titles.values())
+            raise InputError(
+                f"{energy.name}: {document.source.name} has no section {energy.section!r}; there are {there}",
+                part_of(energy.place, "section"),
+            )
 
 
 def describe_trial(trial: Trial, shelf: Shelf) -> dict[str, Any]:
@@ -157,11 +176,19 @@ def _derived_block(section: Section, energy: Expr, block: Expr) -> Expr | None:
     derivation = derive(energy, section, tuple(dict.fromkeys([*section.unknowns, *names])))
     if derivation is None:
         return None
+    derivation, tree = replace(derivation, order=origin_last), None
     if block.op == "force":
-        return derivation.gradient(block.name, FORCE)
-    if block.op == "derivative" and block.args[0].op == "force":
-        return derivation.hessian(block.args[0].name, block.name, FORCE)
-    return None
+        tree = derivation.gradient(block.name, FORCE)
+    elif block.op == "derivative" and block.args[0].op == "force":
+        tree = derivation.hessian(block.args[0].name, block.name, FORCE)
+
+    def spelled_out(node: Expr) -> Expr | None:
+        """What a symbol stands for that the document does not define."""
+        known = node.op != "symbol" or section.meaning(node.name) is not None
+        meaning = None if known else derivation.section.meaning(node.name)
+        return meaning and rebuild(meaning, spelled_out)
+
+    return tree and rebuild(tree, spelled_out)
 
 
 # -- witnesses --------------------------------------------------------------------------------------------------------

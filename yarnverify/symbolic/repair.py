@@ -17,11 +17,12 @@ from functools import cached_property, partial
 from itertools import combinations
 from typing import Any
 
+from yarnverify.symbolic.algebraic import UndefinedError
 from yarnverify.symbolic.court import Court, Verdict
 from yarnverify.symbolic.document import Section, block_of
 from yarnverify.symbolic.forward import Evaluation
 from yarnverify.symbolic.latex import latex, name_latex
-from yarnverify.symbolic.numbers import Floats, UndefinedError
+from yarnverify.symbolic.numbers import Floats
 from yarnverify.symbolic.tree import ONE, PI, ZERO, Expr, Name, ShapeError, Type, number, rebuild
 
 Sides = list[tuple[Expr, Expr]]

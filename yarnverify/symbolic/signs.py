@@ -6,16 +6,18 @@ from collections.abc import Iterable, Iterator
 from itertools import combinations
 from typing import Any
 
+from yarnverify.symbolic.algebraic import NoValueError, UndefinedError
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.forward import Evaluation
-from yarnverify.symbolic.numbers import Floats, NoValueError, UndefinedError
+from yarnverify.symbolic.functions import unfolded
+from yarnverify.symbolic.numbers import Floats
 from yarnverify.symbolic.tree import Expr, Name, Type
 
 Signature = tuple[int, ...]
 
 
 def sided(section: Section, trees: Iterable[Expr]) -> list[Expr]:
-    """Arguments of the absolute values, square roots and arc cosines of some trees, definitions followed.
+    """Absolute values, square roots, arc cosines and logarithms in some trees, definitions followed.
 
     Which way these go depends on the sign of the argument, or on whether it is within [-1, 1]. Norms of vectors are no such.
     """
@@ -29,10 +31,12 @@ def sided(section: Section, trees: Iterable[Expr]) -> list[Expr]:
                 meaning = section.meaning(node.name)
                 if meaning is not None:
                     visit(meaning)
+            elif node.op == "call" and (plain := unfolded(node)) is not None:
+                visit(plain)
             elif (
                 node.op in {"abs", "sqrt"}
                 or (node.op == "norm" and section.type_of(node.args[0]) is Type.SCALAR)
-                or (node.op == "call" and node.value == "arccos")
+                or (node.op == "call" and node.value in ("arccos", "log"))
             ):
                 found.setdefault(node)
 
@@ -49,7 +53,7 @@ def side_of(evaluation: Evaluation, node: Expr) -> int:
         return -1
     except UndefinedError:
         return 0
-    if node.op == "call":
+    if node.value == "arccos":
         value = 1 - value * value
     return _sign(value)
 

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from yarnverify.symbolic.algebraic import UndefinedError
 from yarnverify.symbolic.declare import Assumption
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.forward import Evaluation
-from yarnverify.symbolic.numbers import Rationals, UndefinedError
+from yarnverify.symbolic.numbers import Rationals
 from yarnverify.symbolic.tree import Name
 
 _QUATERNIONS = [

@@ -1,8 +1,9 @@
-"""Energies that are rational in their coordinates: every sum is a step of its own, and derivatives go through the steps.
+"""Energies without measures: every sum and function is a step of its own, and derivatives go through the steps.
 
 What can lose digits is a sum of terms that cancel. Expanded derivatives regroup sums (``u0/6 - u1/6``) and lose what the
 declared form keeps (``(u1 - u0)/6``); here each declared sum is formed once from its own terms, and the chain rule over these
-steps never opens it. ``prove`` shows that the result is the derivative of the energy, entry by entry, as rational functions.
+steps never opens it. Where the energy is rational in its coordinates, ``prove`` shows that the result is its derivative, entry
+by entry, as rational functions.
 """
 
 from __future__ import annotations
@@ -15,7 +16,16 @@ from sympy.polys.fields import FracField
 
 from yarnverify.symbolic.declare import Energy
 from yarnverify.symbolic.document import Section
-from yarnverify.symbolic.emit import Components, Program, active, domain_checks, given_symbols, row_symbols, settled
+from yarnverify.symbolic.emit import (
+    Components,
+    Program,
+    active,
+    domain_checks,
+    given_symbols,
+    length_checks,
+    row_symbols,
+    settled,
+)
 from yarnverify.symbolic.reading import Value
 from yarnverify.symbolic.tree import Expr
 
@@ -27,12 +37,15 @@ def is_rational(energy: Energy, section: Section) -> bool:
     return all(node.op in _RATIONAL for node in section.expand(energy.expression).walk())
 
 
+_STEPS = {"add", "norm", "sqrt", "call", "cross"}
+
+
 class _Sums(Components):
-    """A reading in which every sum is a named step."""
+    """A reading in which every sum and every function is a named step."""
 
     def value(self, expr: Expr, blocks: Callable[[Expr], Value] | None = None) -> Value:
         found = super().value(expr, blocks)
-        return self._steps_of(found) if expr.op == "add" else found
+        return self._steps_of(found) if expr.op in _STEPS else found
 
     def _steps_of(self, value: Value) -> Value:
         return [self._steps_of(part) for part in value] if isinstance(value, list) else self.hold(value)
@@ -70,7 +83,9 @@ class Stages:
 
     def program(self) -> Program:
         """The program of energy, gradient and Hessian."""
-        checks = list(domain_checks(self.energy, self.reading))
+        section = self.reading.section
+        checks = list(length_checks(self.energy, section, self.reading, ", or so little that its square vanishes"))
+        checks += domain_checks(self.energy, self.reading)
         choice = active(self.energy, self.reading)
         return settled(self.steps, self.value, self.gradient, self.hessian, checks, choice)
 

@@ -50,6 +50,17 @@ class Name:
 
 
 @dataclass(frozen=True, slots=True)
+class Inequality:
+    """``left > right``, as a declared domain states it."""
+
+    left: Expr
+    right: Expr
+
+    def __bool__(self) -> bool:
+        raise TypeError("write a chain such as a > b > c, or a and b, as a list: [a > b, b > c]")
+
+
+@dataclass(frozen=True, slots=True)
 class Expr:
     """A node: an operation, its arguments in printed order, and its place in the source.
 
@@ -110,6 +121,12 @@ class Expr:
 
     def __neg__(self) -> Expr:
         return Expr("neg", (self,))
+
+    def __lt__(self, other: Expr | int) -> Inequality:
+        return Inequality(as_expr(other), self)
+
+    def __gt__(self, other: Expr | int) -> Inequality:
+        return Inequality(self, as_expr(other))
 
     def _joined(self, op: str) -> tuple[Expr, ...]:
         return self.args if self.op == op else (self,)
@@ -252,11 +269,12 @@ def type_of(expr: Expr, lookup: Callable[[Name], Type]) -> Type:
                 raise ShapeError(expr.args[1], f"cannot divide by a {kinds[1].value}")
             return kinds[0]
         case "pow" | "sqrt" | "abs" | "call":
-            if kinds[0] not in (Type.SCALAR, Type.UNKNOWN):
+            wrong = [i for i, kind in enumerate(kinds) if kind not in (Type.SCALAR, Type.UNKNOWN)]
+            if wrong:
                 what = {"pow": "raise {} to a power", "sqrt": "take the square root of {}"}.get(
                     expr.op, f"take {expr.value or 'the absolute value'} of {{}}"
                 )
-                raise ShapeError(expr.args[0], "cannot " + what.format(f"a {kinds[0].value}"))
+                raise ShapeError(expr.args[wrong[0]], "cannot " + what.format(f"a {kinds[wrong[0]].value}"))
             return Type.SCALAR
         case "norm":
             if kinds[0] is Type.MATRIX:

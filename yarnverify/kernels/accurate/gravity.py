@@ -80,6 +80,7 @@ KERNEL = runtime.Kernel(
     scaling="lengths",
     portable=True,
     numbers="float",
+    promise="condition",
 )
 
 

@@ -253,6 +253,7 @@ KERNEL = runtime.Kernel(
     scaling="lengths",
     portable=True,
     numbers="float",
+    promise="condition",
 )
 
 

@@ -76,6 +76,7 @@ KERNEL = runtime.Kernel(
     scaling="lengths",
     portable=True,
     numbers="float",
+    promise="condition",
 )
 
 

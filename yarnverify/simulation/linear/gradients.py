@@ -127,6 +127,11 @@ class Gradients:
         self._tolerance, self._iterations = tolerance, iterations
         self.steps = 0  # of the last solution
 
+    @property
+    def bytes(self) -> int:
+        """Memory that the preconditioner takes."""
+        return sum(factor.nbytes for _, factor in self._factors)
+
     @one_thread()
     def solve(self, b: Array) -> Array:
         """The solution for a right-hand side (n,).

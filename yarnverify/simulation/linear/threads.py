@@ -26,13 +26,15 @@ def one_thread() -> Iterator[None]:
     """
     found = _setters()
     before = [get() for get, _ in found]
-    for _, put in found:
-        put(1)
+    for (_, put), number in zip(found, before, strict=True):
+        if number != 1:
+            put(1)
     try:
         yield
     finally:
         for (_, put), number in zip(found, before, strict=True):
-            put(number)
+            if number != 1:
+                put(number)
 
 
 @cache

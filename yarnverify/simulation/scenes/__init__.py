@@ -6,12 +6,16 @@ from yarnverify.simulation.scenes.bias_extension import bias_extension
 from yarnverify.simulation.scenes.buckling import buckling
 from yarnverify.simulation.scenes.catenary import catenary
 from yarnverify.simulation.scenes.closed_ring import closed_ring
+from yarnverify.simulation.scenes.draped_cloth import draped_cloth
 from yarnverify.simulation.scenes.elastica import elastica
 from yarnverify.simulation.scenes.end_moment import end_moment
+from yarnverify.simulation.scenes.energy_over_time import energy_over_time
 from yarnverify.simulation.scenes.hanging_yarn import hanging_yarn
 from yarnverify.simulation.scenes.heavy_cantilever import heavy_cantilever
+from yarnverify.simulation.scenes.hung_cloth import hung_cloth
 from yarnverify.simulation.scenes.picture_frame import picture_frame
 from yarnverify.simulation.scenes.pressed_yarns import pressed_yarns
+from yarnverify.simulation.scenes.pulled_yarn import pulled_yarn
 from yarnverify.simulation.scenes.rigid_motion import rigid_motion
 from yarnverify.simulation.scenes.sliding_yarn import sliding_yarn
 from yarnverify.simulation.scenes.still_cloth import still_cloth
@@ -35,4 +39,8 @@ SCENES: tuple[Scene, ...] = (
     rigid_motion,
     thrown_cloth,
     axial_swing,
+    energy_over_time,
+    hung_cloth,
+    draped_cloth,
+    pulled_yarn,
 )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from yarnverify.simulation.cloth import Fabric
+from yarnverify.simulation.solids import Ball
 from yarnverify.simulation.view.camera import Camera
 from yarnverify.simulation.view.measures import Measure
 from yarnverify.simulation.view.probe import tell, why_not, without_display
@@ -19,6 +21,7 @@ from yarnverify.simulation.view.tubes import Tubes, tubes
 Pixels = NDArray[np.uint8]
 FAMILIES = {"warp": (46, 84, 130), "weft": (222, 196, 150), "yarn": (178, 76, 56)}  # indigo, ecru, madder
 UNKNOWN = (190, 190, 190)  # where a measure has no value
+STONE = (206, 202, 196)  # what yarns lie on
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,17 +48,36 @@ def body(
     *,
     detail: int = 8,
     sides: int = 12,
+    solids: Sequence[Ball] = (),
 ) -> Body:
-    """What is drawn: tubes coloured by a measure on a scale, or by the family of their yarn."""
+    """What is drawn: tubes coloured by a measure on a scale, or by the family of their yarn; and what they lie on."""
     lines = strands(fabric, Q, detail)
     surface = tubes(lines, sides)
     if measure is None:
         families = np.array([FAMILIES[y.family] for y in fabric.yarns], np.uint8)
-        return Body(lines, surface, families[lines.yarn[surface.interval]], True)
-    values = measure.on_samples(lines)
-    colours = colours_of(values, limits or measure.limits, measure.signed)
-    by_face = measure.at == "segments"
-    return Body(lines, surface, colours[surface.interval if by_face else surface.sample], by_face)
+        made = Body(lines, surface, families[lines.yarn[surface.interval]], True)
+    else:
+        values = measure.on_samples(lines)
+        colours = colours_of(values, limits or measure.limits, measure.signed)
+        by_face = measure.at == "segments"
+        made = Body(lines, surface, colours[surface.interval if by_face else surface.sample], by_face)
+    for solid in solids:
+        made = _with(made, solid)
+    return made
+
+
+def _with(body: Body, solid: Ball) -> Body:
+    """The body and a solid beside it."""
+    points, normals, quads = solid.surface()
+    old = body.tubes
+    count = len(quads if body.by_face else points)
+    at = len(old.quads) if body.by_face else len(old.points)
+    stone = np.tile(np.array(STONE, np.uint8), (count, 1))
+    tubes = replace(
+        old, points=np.concatenate([old.points, points]), normals=np.concatenate([old.normals, normals]),
+        quads=np.concatenate([old.quads, quads + len(old.points)]),
+    )  # fmt: skip
+    return replace(body, tubes=tubes, colours=np.concatenate([body.colours[:at], stone, body.colours[at:]]))
 
 
 def colours_of(values: NDArray[np.float64], limits: tuple[float, float], signed: bool) -> Pixels:

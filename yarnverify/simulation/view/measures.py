@@ -108,6 +108,12 @@ def pressing(fabric: Fabric, Q: ArrayLike) -> Measure:
     return Measure("contact", "mm overlap", _at(fabric, made, 1e3 * overlap), "segments", least=1e-12)
 
 
+def slipping(fabric: Fabric, Q: ArrayLike) -> Measure:
+    """How far each yarn has slid through its nodes since rest, millimetres."""
+    slides = fabric.chain.slides
+    return Measure("sliding", "mm", 1e3 * np.abs(np.asarray(Q, float)[slides] - fabric.Q[slides]), "nodes", least=1e-12)
+
+
 def energy(fabric: Fabric, table: Table, energies: ArrayLike, name: str) -> Measure:
     """Energies of the elements of a table, joules: on the segment or at the node that they belong to.
 
@@ -132,11 +138,12 @@ MEASURES: dict[str, Callable[[Fabric, ArrayLike], Measure]] = {
     "bending": turning,
     "shear": shearing,
     "contact": pressing,
+    "sliding": slipping,
 }
 
 
 def measure(fabric: Fabric, Q: ArrayLike, name: str) -> Measure:
-    """A measure by name: ``stretch``, ``bending``, ``shear`` or ``contact``."""
+    """A measure by name: ``stretch``, ``bending``, ``shear``, ``contact`` or ``sliding``."""
     if name not in MEASURES:
         raise InputError(f"colour by {name!r}: there are {', '.join(MEASURES)}, or give a Measure")
     return MEASURES[name](fabric, Q)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from yarnverify.errors import InputError
 from yarnverify.simulation.cloth import Fabric
+from yarnverify.simulation.solids import Ball
 from yarnverify.simulation.view.camera import Camera, camera
 from yarnverify.simulation.view.drawing import FAMILIES, Body, Pixels, body, pixels, table_of
 from yarnverify.simulation.view.files import whole
@@ -17,6 +18,7 @@ from yarnverify.simulation.view.measures import Measure, measure, shown
 from yarnverify.simulation.view.movies import write_movie
 from yarnverify.simulation.view.probe import required
 from yarnverify.simulation.view.sheet import BOTTOM, RIGHT, TOP, Sheet
+from yarnverify.simulation.view.strands import strands
 
 Colour = str | Measure | None
 View = str | tuple[ArrayLike, ArrayLike]
@@ -34,6 +36,7 @@ def picture(
     title: str = "",
     note: str = "",
     size: tuple[int, int] = (1600, 1200),
+    solids: Sequence[Ball] = (),
 ) -> Path:
     """Draw a configuration as PNG (or any format that pillow knows).
 
@@ -42,7 +45,7 @@ def picture(
     Q
         Configuration, (size,), m.
     colour
-        ``stretch``, ``bending``, ``shear``, ``contact``, or a ``Measure``; None shows warp and weft.
+        ``stretch``, ``bending``, ``shear``, ``contact``, ``sliding``, or a ``Measure``; None shows warp and weft.
     limits
         Ends of the scale, in the unit of the measure; by default what the configuration has.
     view
@@ -51,6 +54,8 @@ def picture(
         Written above, at the left and at the right.
     size
         Width and height in pixels.
+    solids
+        What the yarns lie on.
 
     Raises
     ------
@@ -59,7 +64,7 @@ def picture(
     """
     required()
     chosen = _chosen(fabric, Q, colour)
-    drawn = body(fabric, Q, chosen, limits, **_fineness(fabric))
+    drawn = body(fabric, Q, chosen, limits, **_fineness(fabric), solids=solids)
     seen = camera([drawn.tubes.points], view, aspect=size[0] / size[1], room=ROOM)
     sheet = Sheet(fabric, size, seen, chosen, limits, title)
     return _save(sheet.compose(pixels(drawn, seen, size), note), Path(path))
@@ -78,6 +83,7 @@ def movie(
     title: str = "",
     size: tuple[int, int] = (960, 720),
     rate: float = 20.0,
+    solids: Sequence[Ball] = (),
 ) -> Path:
     """A movie of configurations over time, or of a standing one from all around: GIF, or MP4 where imageio-ffmpeg is installed.
 
@@ -95,6 +101,8 @@ def movie(
         Turns of the camera about the vertical from the first frame to the end.
     rate
         Frames a second.
+    solids
+        What the yarns lie on.
 
     Raises
     ------
@@ -114,9 +122,9 @@ def movie(
 
     def bodies() -> Iterator[Body]:
         for Q, one in zip(frames, measures, strict=True):
-            yield body(fabric, Q, one, scale, **fineness)
+            yield body(fabric, Q, one, scale, **fineness, solids=solids)
 
-    clouds = (drawn.strands.points for drawn in bodies())
+    clouds = [strands(fabric, Q, 2).points for Q in frames] + [solid.surface(12)[0] for solid in solids]
     seen = camera(clouds, view, aspect=size[0] / size[1], room=ROOM, margin=fabric.R, turning=turn != 0)
     sheet = Sheet(fabric, size, seen, measures[0], scale, title)
     notes = [""] * len(frames) if times is None else [time_note(t, max(map(abs, times))) for t in times]

@@ -15,15 +15,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from yarnverify.errors import InputError
 from yarnverify.simulation.cloth import Fabric
+from yarnverify.simulation.solids import Ball
 from yarnverify.simulation.view.camera import VIEWS, camera
-from yarnverify.simulation.view.drawing import FAMILIES, UNKNOWN, table_of
+from yarnverify.simulation.view.drawing import FAMILIES, STONE, UNKNOWN, table_of
 from yarnverify.simulation.view.files import whole
 from yarnverify.simulation.view.measures import MEASURES, Measure, measure
 from yarnverify.simulation.view.pictures import time_note
 from yarnverify.simulation.view.probe import required
 from yarnverify.simulation.view.strands import strands
 
-_LEVELS = 254  # 255 means that there is no value
+_LEVELS = 253  # 254 means that there is no value, 255 is for what yarns lie on
 
 
 def scene(
@@ -37,6 +38,7 @@ def scene(
     rate: float = 20.0,
     detail: int = 6,
     sides: int = 12,
+    solids: Sequence[Ball] = (),
 ) -> Path:
     """Write a scene to turn, zoom and play in a browser (WebGL 2).
 
@@ -52,6 +54,8 @@ def scene(
         Frames a second.
     detail, sides
         Samples a segment and faces around a yarn.
+    solids
+        What the yarns lie on.
     """
     required()
     several = np.atleast_2d(np.asarray(frames, float))
@@ -65,7 +69,8 @@ def scene(
     step = float(max((high - low).max(), fabric.R) / 65535)
     first = lines[0]
     starts = np.flatnonzero(np.r_[True, first.yarn[1:] != first.yarn[:-1]])
-    clouds = list(points)
+    clouds = [*points, *(solid.surface(12)[0] for solid in solids)]
+    low_seen, high_seen = (end([end(cloud, axis=0) for cloud in clouds], axis=0) for end in (np.min, np.max))
     seen = {name: camera(clouds, name, aspect=4 / 3, room=(0.06, 0.15, 0.14, 0.1), margin=fabric.R) for name in VIEWS}
     start = seen["oblique"]
     data: dict[str, Any] = {
@@ -80,6 +85,7 @@ def scene(
         "low": low.tolist(),
         "step": step,
         "lines": _packed(np.rint((points - low) / step).astype("<u2")),
+        "solids": [_solid(solid) for solid in solids],
         "measures": [_families(fabric, first), *(_measured(fabric, several, lines, name) for name in colours)],
         "families": [
             (name, FAMILIES[name])
@@ -95,7 +101,7 @@ def scene(
             "pivot": start.pivot.tolist(),
             "height": start.height,
             "aspect": 4 / 3,
-            "depth": float(2 * np.linalg.norm(high - low) + 20 * fabric.R),
+            "depth": float(2 * np.linalg.norm(high_seen - low_seen) + 20 * fabric.R),
         },
     }
     page = files("yarnverify.simulation.view").joinpath("scene.html").read_text(encoding="utf-8")
@@ -109,13 +115,20 @@ def _packed(array: NDArray[Any]) -> str:
     return base64.b64encode(gzip.compress(array.tobytes(), 6, mtime=0)).decode()
 
 
+def _solid(solid: Ball) -> dict[str, str]:
+    points, normals, quads = solid.surface()
+    triangles = quads[:, [0, 1, 2, 0, 2, 3]]
+    arrays = {"points": points.astype("<f4"), "normals": normals.astype("<f4"), "triangles": triangles.astype("<u4")}
+    return {name: _packed(values) for name, values in arrays.items()}
+
+
 def _families(fabric: Fabric, line: Any) -> dict[str, Any]:
     """Which yarn is which, as a measure with three colours."""
     names = list(FAMILIES)
     index = np.array([names.index(y.family) for y in fabric.yarns], np.uint8)
     return {
         "name": "yarns",
-        "colours": [*map(list, FAMILIES.values())],
+        "colours": [*map(list, FAMILIES.values()), *[list(UNKNOWN)] * (255 - len(FAMILIES)), list(STONE)],
         "values": _packed(index[line.yarn]),
         "still": True,
         "stepped": True,
@@ -128,13 +141,13 @@ def _measured(fabric: Fabric, frames: NDArray[np.float64], lines: Sequence[Any],
     width = high - low if high > low else 1.0
     values = np.stack([m.on_samples(line) for m, line in zip(found, lines, strict=True)])
     middle = _LEVELS / 2 if found[0].signed and not high > low else 0.0
-    levels = np.where(np.isfinite(values), np.clip(np.rint((values - low) / width * _LEVELS + middle), 0, _LEVELS), 255)
+    levels = np.where(np.isfinite(values), np.clip(np.rint((values - low) / width * _LEVELS + middle), 0, _LEVELS), 254)
     colours = table_of(found[0].signed)[np.rint(np.arange(_LEVELS + 1) / _LEVELS * 255).astype(int)]
     return {
         "name": found[0].name,
         "label": found[0].label,
         "lacking": found[0].lacking(fabric),
-        "colours": [*colours.tolist(), list(UNKNOWN)],
+        "colours": [*colours.tolist(), list(UNKNOWN), list(STONE)],
         "values": _packed(levels.astype(np.uint8)),
         "stepped": found[0].at == "segments",
         "ticks": _ticks(low, high),

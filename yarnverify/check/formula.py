@@ -1,0 +1,204 @@
+"""What is wrong with a formula, where it is recognised: by comparison with what may have been written instead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from yarnverify.check.cases import Cases, angles
+from yarnverify.check.factors import Factor, factor, quantities, ratio, terms
+from yarnverify.check.judge import Block
+from yarnverify.symbolic.declare import Energy
+
+Array = NDArray[Any]
+_ROUNDED = (1.57, 1.571, 1.5708, 1.570796)  # what people write for pi/2
+
+
+class Formula:
+    """Comparisons at chosen states.
+
+    Parameters
+    ----------
+    cases, blocks
+        What was tried, and everything that came back.
+    printed
+        Gives G and H of the document's own formulas, None where there are none.
+    """
+
+    def __init__(self, cases: Cases, blocks: list[Block], printed: Callable[[], dict[str, Array] | None]) -> None:
+        self.cases, self.blocks, self._printed = cases, blocks, printed
+        self.tolerance = 1e-3 if cases.dtype == "float32" else 1e-6
+        self.angle = angles(cases)
+        self._quantities: dict[str, Array] | None = None
+
+    def named(self, at: Array) -> dict[str, Array]:
+        if self._quantities is None:
+            self._quantities = quantities(self.cases)
+        return {name: value[at] for name, value in self._quantities.items()}
+
+    def mistake(self, block: Block, at: Array) -> tuple[str, Factor | None]:
+        """What a block is instead of what it should be, in words; and the factor between the two, if that is all."""
+        computed, true = block.computed[:, at], block.true[:, at]
+        size = np.abs(true).max(axis=0)
+        if not np.any(computed):
+            return "is zero, as if left out", None
+        live = size > 0
+        if not live.any():
+            return "is not zero, as it should be", None
+        found = ratio(computed[:, live], true[:, live], self.tolerance)
+        if found is not None:
+            known = factor(found, self.named(np.flatnonzero(at)[live]), self.tolerance)
+            if known is not None:
+                return _factor_text(known), known
+            offset = self._right_angle(found, np.flatnonzero(at)[live]) or self._rounded(
+                found, np.flatnonzero(at)[live]
+            )
+            if offset:
+                return offset, None
+        for test in (
+            self._printed_block,
+            self._transposed,
+            self._other_block,
+            self._first_derivatives,
+            self.definite,
+            self._term,
+        ):
+            text = test(block, at)
+            if text:
+                return text, None
+        if found is not None:
+            return "points the right way but has another size", None
+        return "", None
+
+    def _same(self, computed: Array, other: Array) -> bool:
+        with np.errstate(all="ignore"):
+            gap = np.sqrt(((computed - other) ** 2).sum(axis=0))
+            size = np.sqrt((other**2).sum(axis=0))
+        return bool(np.isfinite(gap).all() and size.any() and np.all(gap <= self.tolerance * size.clip(min=1e-300)))
+
+    def _printed_block(self, block: Block, at: Array) -> str:
+        printed = self._printed()
+        if printed is None or block.kind == "E":
+            return ""
+        places = dict(self.cases.labels)
+        where = tuple(places[name] for name in block.name.split(","))
+        values = printed[block.kind][where].reshape(block.computed.shape[0], -1)
+        if self._same(values[:, at], block.true[:, at]) or not self._same(block.computed[:, at], values[:, at]):
+            return ""
+        return f"is what the document prints, misprint included{equation_of(self.cases.energy, block.name)}"
+
+    def _transposed(self, block: Block, at: Array) -> str:
+        if block.kind != "H" or block.computed.shape[0] != 9:
+            return ""
+        turned = block.true.reshape(3, 3, -1).swapaxes(0, 1).reshape(9, -1)
+        for sign, text in ((1, "is transposed"), (-1, "is transposed and has the wrong sign")):
+            if self._same(sign * block.computed[:, at], turned[:, at]):
+                return text
+        return ""
+
+    def _other_block(self, block: Block, at: Array) -> str:
+        for other in self.blocks:
+            if other.kind == block.kind and other.name != block.name and other.true.shape == block.true.shape:
+                for sign in (1, -1):
+                    if self._same(sign * block.computed[:, at], other.true[:, at]):
+                        what = "is" if sign > 0 else "is minus"
+                        return f"{what} the block {other.name.replace(',', ', ')}: indices are swapped"
+        return ""
+
+    def _first_derivatives(self, block: Block, at: Array) -> str:
+        """The Gauss-Newton part of a law that is quadratic in its measure: g g^T/(2 E)."""
+        if block.kind != "H":
+            return ""
+        places = dict(self.cases.labels)
+        gradient, energy = self.cases.truth.gradient, self.cases.truth.energy
+        a, b = (gradient[places[name]] for name in block.name.split(","))
+        with np.errstate(all="ignore"):
+            outer = (a[:, None] * b[None]).reshape(-1, len(self.cases)) / (2 * energy)
+        if not self._same(block.computed[:, at], outer[:, at]):
+            return ""
+        return (
+            "holds first derivatives only (Gauss-Newton): the term with the measure's own second derivative is missing"
+        )
+
+    def definite(self, block: Block, at: Array) -> str:
+        if block.kind != "H":
+            return ""
+        whole = np.moveaxis(self.cases.truth.hessian[..., at], -1, 0)
+        values, vectors = np.linalg.eigh(whole)
+        clamped = np.moveaxis((vectors * np.maximum(values, 0)[:, None, :]) @ vectors.swapaxes(1, 2), 0, -1)
+        places = dict(self.cases.labels)
+        rows, columns = (places[name] for name in block.name.split(","))
+        if not self._same(block.computed[:, at], clamped[rows, columns].reshape(block.computed.shape[0], -1)):
+            return ""
+        return "has its negative eigenvalues set to zero: a form for solvers, not the derivative"
+
+    def _term(self, block: Block, at: Array) -> str:
+        """A difference from the truth that is a multiple of one term of the kind that formulas are made of."""
+        rest = block.computed[:, at] - block.true[:, at]
+        for name, term in terms(self.cases, rest.shape[0]).items():
+            if ratio(rest, term[:, at], self.tolerance) is not None:
+                return f"is off by a multiple of {name}: that term is wrong, or missing"
+        return ""
+
+    def _right_angle(self, found: Array, at: Array) -> str:
+        deviation = self.angle[at] - np.pi / 2
+        offset = (found - 1) * deviation
+        middle = float(np.median(offset))
+        if not np.isfinite(offset).all() or abs(middle) > 0.2 or np.abs(offset - middle).max() > 1e-3 * abs(middle):
+            return ""
+        return f"takes {np.pi / 2 - middle:.8g} for pi/2"
+
+    def _rounded(self, found: Array, at: Array) -> str:
+        """A factor besides a rounded right angle."""
+        angle = self.angle[at]
+        for value in _ROUNDED:
+            known = factor(found * (angle - np.pi / 2) / (angle - value), self.named(at), self.tolerance)
+            if known is not None:
+                return f"takes {value} for pi/2, and {_factor_text(known)}"
+        return ""
+
+
+def _factor_text(found: Factor) -> str:
+    if found.is_sign:
+        return "has the wrong sign"
+    missing = found.inverse
+    if found.powers and abs(abs(found.number) - 1) < 1e-5:
+        sign = ", and has the wrong sign" if found.number < 0 else ""
+        return f"lacks a factor {Factor(abs(missing.number), missing.powers)}{sign}"
+    return f"is {found} times what it should be"
+
+
+def equation_of(energy: Energy, block: str) -> str:
+    """Which equation prints a Jacobian that is not the true one; empty where none is found."""
+    number, mistaken = _equations(energy.name, energy.document).get(block, ("", False))
+    if not number:
+        return ""
+    return f": equation ({number})" + ("" if mistaken else ", a sum of mistaken Jacobians")
+
+
+@cache
+def _equations(name: str, name_of_document: str) -> dict[str, tuple[str, bool]]:
+    """The number of the equation that prints each Jacobian of an energy, and whether it is a known erratum."""
+    from yarnverify.library import Shelf, derivations, errata
+    from yarnverify.source import load
+    from yarnverify.symbolic.declare import load_declarations
+    from yarnverify.symbolic.document import block_of
+    from yarnverify.symbolic.prove import read_with
+
+    path = derivations() / name_of_document
+    if not path.is_file():
+        return {}
+    known = {erratum.equation for erratum in errata(Shelf(path.parent, path.name, ""))}
+    document = read_with(load(path), load_declarations(path.parent))
+    found: dict[str, tuple[str, bool]] = {}
+    for section in document.sections:
+        if section.declared is not None and section.declared.name == name:
+            for claim in section.claims:
+                row, _, column = block_of(claim.left).removeprefix("dF_").partition("/d")
+                number = claim.relation.equation
+                found.setdefault(f"{row},{column}", (number, number in known))
+    return found

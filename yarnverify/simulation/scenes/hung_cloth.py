@@ -1,0 +1,59 @@
+"""A cloth hung by two corners: let go level and a little slack, it swings down and comes to rest."""
+
+import numpy as np
+from scipy.optimize import brentq
+
+from yarnverify.errors import InputError
+from yarnverify.kernels import bending, gravity, kinetic, shear, stretch
+from yarnverify.simulation.assembly import Term
+from yarnverify.simulation.dynamics import Scheme
+from yarnverify.simulation.fabric import bends, segments, shears, weave
+from yarnverify.simulation.quantities import choice, positive
+from yarnverify.simulation.scene import scene
+from yarnverify.simulation.setting import Moving
+
+
+@scene(
+    title="a cloth hung by two corners",
+    size="yarns of each family",
+    sizes=(56,),
+    wall="at the crossings of two corners, nearer to each other than the edge between them is long",
+    least=3,
+    solvers=("direct",),
+)
+def hung_cloth(
+    size: int,
+    slack: float = positive(0.15, "", "how much nearer the corners are, of the edge"),
+    until: float = positive(0.6, "s"),
+    h: float = positive(5e-3, "s", "implicit Euler damps what is faster, as air and friction of fibres do"),
+    k_s: float = positive(50.0, "N", "cotton yarn of 20 tex, 2.5 N/tex"),
+    k_b: float = positive(6e-10, "N m^2", "100 fibres of cotton that slide freely, 6e-12 N m^2 each"),
+    k_x: float = positive(3e-4, "N", "open gauze: 4 k_x/L = 1 N/m, a fifth of a light shirting"),
+    rho: float = positive(2e-5, "kg/m", "20 tex"),
+    L: float = positive(1.2e-3, "m", "gauze of 8 yarns a centimetre"),
+    R: float = positive(0.15e-3, "m", "20 tex, loosely twisted"),
+    g: float = positive(9.81, "m/s^2", "gravity"),
+    scheme: Scheme = choice("implicit_euler", "bdf2", "midpoint"),
+) -> Moving:
+    if not slack < 0.9:
+        raise InputError(f"slack = {slack:g} must be less than 0.9 of the edge")
+    cloth = weave("plain", (size, size), L, R, tails=L / 2)
+    terms = [
+        Term(stretch, segments(cloth), {"k_s": k_s}),
+        Term(bending, bends(cloth), {"k_b": k_b}),
+        Term(shear, shears(cloth), {"k_x": k_x}),
+        Term(gravity, segments(cloth, gravity), {"rho": rho, "g": (0, 0, -g)}),
+    ]
+    # bent to an arc that sags: no yarn is stretched at the start
+    half, edge = brentq(lambda a: np.sin(a) / a - (1 - slack), 1e-3, np.pi), (size - 1) * L
+    start = cloth.Q.copy()
+    points = cloth.points(start)
+    angle = half * (2 * points[:, 0] / edge - 1)
+    points[:, 0] = edge / (2 * half) * np.sin(angle)
+    points[:, 2] = edge / (2 * half) * (np.cos(half) - np.cos(angle))
+    free = np.setdiff1d(cloth.positions(), cloth.positions([cloth.node(0, -1), cloth.node(-1, -1)]))
+    mass = Term(kinetic, segments(cloth, kinetic), {"rho": rho})
+    return Moving(
+        cloth, terms, free, mass, until, h, scheme=scheme, start=start, options={"residual": 1e-7, "step": 1e-8},
+        watch={"energy": lambda at: at.motion.energy if at.motion else np.nan}, frames=60, view=((0.35, -1, 0.35), (0, 0, 1)),
+    )  # fmt: skip
