@@ -26,7 +26,7 @@ def summary(record: Mapping[str, Any]) -> Table:
     headings = ("scene", "size", "answer", "error", "allowed", "order", "iterations or steps", "time")
     return Table("Every scene in its first way, at its largest size", headings, tuple(rows), (
         "Errors are relative; *exact*: no error but rounding at any size; else the order between the two largest sizes, and "
-        "what is expected. Times are shown, and compared with nothing.",
+        "what is expected. Times are those of the processor; shown, and compared with nothing.",
     ))  # fmt: skip
 
 
@@ -105,10 +105,14 @@ def _moved(own: Mapping[str, Any], way: str) -> str:
         return ""
     if own["trouble"]:
         return f"not solved: {own['trouble']}"
-    most = [NO_ANSWER if move["by"] is None else f"{move['by']:.0e}" for move in own["moved"]]
+    most = [_size(move["by"]) for move in own["moved"]]
     if len(set(most)) == 1:
         return most[0]
     return ", ".join(f"{move['name']} {size}" for move, size in zip(own["moved"], most, strict=True))
+
+
+def _size(by: float | None) -> str:
+    return NO_ANSWER if by is None else f"{by:.0e}" if by else "0"
 
 
 def _allowed(answer: Mapping[str, Any]) -> str:

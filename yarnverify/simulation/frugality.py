@@ -6,7 +6,7 @@ import tracemalloc
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -78,10 +78,10 @@ def _moved(known: Known, one: Outcome, other: Outcome) -> dict[str, Any]:
 
 
 def _spent(setting: Setting, patience: float) -> tuple[dict[str, Any], dict[str, Any], Outcome | None]:
-    begin, reached, trouble = perf_counter(), None, ""
+    begin, reached, trouble = process_time(), None, ""
 
     def wait(label: str) -> None:
-        if perf_counter() - begin > patience:
+        if process_time() - begin > patience:
             raise _TooSlow
 
     run = Run(setting, report=wait)
@@ -92,7 +92,7 @@ def _spent(setting: Setting, patience: float) -> tuple[dict[str, Any], dict[str,
         trouble = f"given up after {PATIENCE:g} times the time of the scene"
     except (NotConverged, ElementError, LinearSolveError) as error:
         trouble = str(error).split(";")[0].split(": ")[0]
-    seconds = perf_counter() - begin
+    seconds = process_time() - begin
     arrays: Mapping[str, Any] = {} if reached is None else reached.arrays()
     done = int(arrays.get("iterations", 0))
     system = run.system
