@@ -37,6 +37,10 @@ BY_NAME = {family.name: family for family in FAMILIES}
         # shear: k_x L g g^T with g = (-d1 - d3, d3, d1)/L; contact: k_c L (1, -1)(1, -1)^T
         ("shear", [(4.0, 1), (0.0, 8)]),
         ("parallel_contact", [(2.0, 1), (0.0, 1)]),
+        # gravity: rho g (z0 + z1)(u1 - u0)/2; plane and sphere: cubes of the depth
+        ("gravity", [(1.0, 1), (-1.0, 1), (0.0, 6)]),
+        ("plane", [(0.0, 3)]),
+        ("sphere", [(0.0, 3)]),
     ],
 )
 def test_eigenvalues_at_rest_are_those_of_the_closed_forms(name: str, expected: list[tuple[float, int]]) -> None:
@@ -67,7 +71,24 @@ def test_maps_show_every_state_but_rest_as_indefinite_for_angles() -> None:
     assert pressed.held is None and (pressed.free == 0).all()
 
 
-@pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)
+def test_a_plane_pushes_stably_and_a_sphere_does_not() -> None:
+    """2 k (R - r) along, and -k (R - r)^2/r across, where the force is not parallel all around."""
+    flat, round_ = sign_map(BY_NAME["plane"]), sign_map(BY_NAME["sphere"])
+    assert flat.counts == (0,) and round_.counts == (2,)
+    r = BY_NAME["sphere"].stretch[1]
+    along, across = 2 * (1 - r), -((1 - r) ** 2) / r
+    assert round_.free[:, 0] == pytest.approx(across / np.maximum(along, -across), rel=1e-12)
+
+
+def test_gravity_is_indefinite_only_where_yarns_slide() -> None:
+    found = sign_map(BY_NAME["gravity"])
+    assert found.held is not None and (found.held == 0).all()
+    assert found.free == pytest.approx(-1)
+
+
+@pytest.mark.parametrize(
+    "family", [f for f in FAMILIES if not {"n", "c", "g"} & set(f.parameters)], ids=lambda family: family.name
+)
 def test_spectra_do_not_depend_on_where_an_element_lies(family: Any) -> None:
     rng = np.random.default_rng(7)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]

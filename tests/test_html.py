@@ -94,6 +94,15 @@ def test_what_was_not_measured_says_so() -> None:
     assert "Command: yarnverify accuracy --write" in text
 
 
+def test_energies_without_a_document_have_no_verdicts() -> None:
+    found = copy.deepcopy(records())
+    nothing = {"document": "", "claims": [], "equations": [], "completeness": [], "given": []}
+    found["verdicts"] |= nothing | {"tally": dict.fromkeys(found["verdicts"]["tally"], 0)}
+    text = whole_page(found)
+    assert not {"verdicts", "corrections", "equations"} & set(read(text).ids)
+    assert {target[1:] for target in read(text).targets} <= set(read(text).ids)
+
+
 def test_text_of_a_document_is_no_markup() -> None:
     found = copy.deepcopy(records())
     claim = next(claim for claim in found["verdicts"]["claims"] if claim["equation"] == "8")

@@ -145,7 +145,12 @@ def summary(record: dict[str, Any], path: str) -> str:
     """A short summary of a step, as Markdown."""
     good = "✅" if record["as_expected"] else "❌"
     tally, *rest = tally_lines(record)
-    lines = [f"### {good} yarnverify: {record['document']}", "", f"**{tally}**  ", *(f"{line}  " for line in rest)]
+    lines = [
+        f"### {good} yarnverify: {record['document'] or path}",
+        "",
+        f"**{tally}**  ",
+        *(f"{line}  " for line in rest),
+    ]
     wrong = mistakes(record)
     if wrong:
         lines += ["", "| equation | where | verdict | what | erratum |", "|---|---|---|---|---|"]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from yarnverify.kernels import bending, parallel_contact, shear, stretch
+from yarnverify.kernels import bending, gravity, parallel_contact, plane, shear, sphere, stretch
 
 Array = NDArray[Any]
 NOISE = 1e-10  # of the largest eigenvalue of a state; smaller ones count as zero
@@ -34,7 +34,7 @@ class Family:
     unit
         Of an eigenvalue.
     parameters
-        All one.
+        All one; directions along z, centres at the origin.
     """
 
     kernel: ModuleType
@@ -43,7 +43,7 @@ class Family:
     stretch: tuple[str, Array]
     rest: tuple[float, float]
     unit: str
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -80,7 +80,13 @@ def _pressed(angle: Array, stretch: Array) -> Array:
     return np.stack([np.zeros_like(stretch), stretch])
 
 
+def _outside(angle: Array, stretch: Array) -> Array:
+    return np.stack([np.zeros_like(stretch), np.zeros_like(stretch), stretch])
+
+
 _ONE = np.zeros(1)
+_UP, _ORIGIN = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+_NEAR = ("distance over R", np.linspace(0.02, 0.98, 49))
 FAMILIES = (
     Family(
         stretch, _stretched, ("", _ONE), ("stretch l/(u_1 - u_0)", np.linspace(0.2, 2.0, 37)), (0.0, 1.0),
@@ -98,10 +104,16 @@ FAMILIES = (
         parallel_contact, _pressed, ("", _ONE), ("distance over the distance of contact", np.linspace(0.02, 0.98, 49)),
         (0.0, 0.5), "k_c L", {"k_c": 1.0, "L": 1.0, "d": 1.0},
     ),
+    Family(
+        gravity, _stretched, ("", _ONE), ("stretch l/(u_1 - u_0)", np.linspace(0.2, 2.0, 37)), (0.0, 1.0),
+        "rho g", {"rho": 1.0, "g": (0.0, 0.0, -1.0)},
+    ),
+    Family(plane, _outside, ("", _ONE), _NEAR, (0.0, 1.0), "k R", {"k": 1.0, "n": _UP, "p": _ORIGIN, "R": 1.0}),
+    Family(sphere, _outside, ("", _ONE), _NEAR, (0.0, 1.0), "k R", {"k": 1.0, "c": _ORIGIN, "R": 1.0}),
 )  # fmt: skip
 
 
-def spectrum(kernel: ModuleType, q: ArrayLike, sliding: bool = True, **parameters: float) -> Array:
+def spectrum(kernel: ModuleType, q: ArrayLike, sliding: bool = True, **parameters: Any) -> Array:
     """Eigenvalues of the Hessian of elements, (dofs, n), in ascending order.
 
     Parameters
@@ -177,5 +189,6 @@ def sign_map(family: Family) -> Map:
 
 
 def _lowest(values: Array) -> Array:
-    share = values[0] / np.abs(values).max(axis=0)
+    size = np.abs(values).max(axis=0)
+    share = np.divide(values[0], size, out=np.zeros_like(size), where=size > 0)
     return np.where(share < -NOISE, share, 0.0)

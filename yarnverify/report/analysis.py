@@ -61,7 +61,8 @@ def _rest(record: dict[str, Any]) -> Table:
         rows.append((name, values, own["unit"], ", ".join(map(str, own["negative"])), share))
     headings = ("energy", "eigenvalues at rest", "unit", "negative ones on the map", "indefinite on the map")
     note = (
-        "Of one element, with all unknowns free; h is the rest length of a segment. Contact is taken where it sets in."
+        "Of one element, with all unknowns free; h is the rest length of a segment. Parallel contact is taken where it sets "
+        "in; plane and sphere set in without stiffness. Kinetic energy is no potential and is left out."
     )
     return Table("Hessian of each energy", headings, tuple(rows), (note,))
 
@@ -70,8 +71,8 @@ def _steps(record: dict[str, Any]) -> Table:
     rows = tuple((row["energy"], _number(row["omega"]), _number(row["step"])) for row in record["steps"]["rows"])
     notes = (
         "Mass lumped at the nodes, all nodes free, sliding held: without friction or a mass of its own, sliding along a "
-        "straight yarn moves no material, and bounds no step. h = 2/omega for central differences at rest; tension makes it "
-        "smaller.",
+        "straight yarn moves no material, and bounds no step. h = 2/omega for central differences at rest; bending stiffens "
+        "without bound as its angle goes to pi, shear as its goes to 0 or pi.",
     )
     size = record["steps"]["size"]
     title = f"Largest stable explicit step, {size} by {size} yarns"

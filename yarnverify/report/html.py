@@ -58,6 +58,7 @@ def page(
     """
     found, derived = records["verdicts"], records["derivations"]
     analysis, simulation = records.get("analysis"), records.get("simulation")
+    absent = ("scenes", "analysis") * bool(name) + ("verdicts", "corrections", "equations") * (not found["document"])
     templates = Environment(
         loader=FileSystemLoader(_FOLDER / "templates" / "page"),
         undefined=StrictUndefined,
@@ -71,7 +72,8 @@ def page(
     templates.globals.update(sign=_SIGN, worst_verdict=_worst, where=where)
     templates.globals.update(argument=f" {name}" if name else "", prefix=f"{name}/" if name else "")
     return templates.get_template("report.html.jinja").render(
-        parts=[part for part in _PARTS if not (name and part[0] in ("scenes", "analysis"))],
+        parts=[(anchor, title) for anchor, title in _PARTS if anchor not in absent],
+        absent=absent,
         style=Markup((_FOLDER / "templates" / "page" / "report.css").read_text(encoding="utf-8")),
         font=b64encode((_FOLDER / "fonts" / "stix-two-math.woff2").read_bytes()).decode(),
         found=found,

@@ -12,6 +12,7 @@ from yarnverify.report.accuracy import accuracy_table, kinds
 from yarnverify.report.analysis import analysis_tables, fabric_line
 from yarnverify.report.benchmark import benchmark_table, where
 from yarnverify.report.simulation import frugality, studies, summary
+from yarnverify.report.simulation_speed import speed_tables
 
 _TEMPLATES = Environment(
     loader=FileSystemLoader(Path(__file__).parent / "templates"),
@@ -31,7 +32,7 @@ def pages(
     ----------
     records
         ``verdicts``, ``derivations`` and ``kernels``, as written to ``records/``;
-        ``accuracy``, ``benchmark``, ``analysis`` and ``simulation`` where measured.
+        ``accuracy``, ``benchmark``, ``analysis``, ``simulation`` and ``simulation-speed`` where measured.
     pictures
         Names of the pictures that are in ``pictures/``.
     source
@@ -51,6 +52,7 @@ def pages(
             place=place,
             analysed=records.get("analysis") is not None,
             simulated=records.get("simulation") is not None,
+            timed=records.get("simulation-speed") is not None,
         )
     }
     for energy, derivation in derived.items():
@@ -88,6 +90,16 @@ def pages(
             summary=summary(simulation),
             frugality=frugality(simulation),
             studies={each["result"]["scene"]: studies(each) for each in simulation["scenes"]},
+            pictures=pictures,
+        )
+    speed = records.get("simulation-speed")
+    if speed is not None:
+        texts["simulation-speed.md"] = _render(
+            "simulation_speed.md.jinja",
+            tables=speed_tables(speed),
+            where=where(speed),
+            rounds=speed["rounds"],
+            command=speed["command"],
             pictures=pictures,
         )
     return dict(sorted(texts.items()))

@@ -75,6 +75,9 @@ class Energy:
     unchanged: tuple[str, ...] = ()
     place: tuple[str, int, int] = field(default=("", 1, 1), compare=False)
 
+    def _repr_latex_(self) -> str:
+        return "$\\displaystyle V = " + self.expression._repr_latex_().removeprefix("$\\displaystyle ")
+
     @property
     def file(self) -> str:
         """Name of the file that declares it."""
