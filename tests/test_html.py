@@ -13,7 +13,7 @@ import pytest
 
 from tests.pages import records, simulated, whole_page
 from yarnverify.report.mathml import compared, formula
-from yarnverify.report.scenes import overview, scenes
+from yarnverify.report.scenes import scenes
 from yarnverify.report.svg import inline
 
 
@@ -136,15 +136,6 @@ def test_results_of_a_gallery_are_shown_without_a_record() -> None:
     assert len(scenes(simulated(), [result])) == 2  # the record has it
 
 
-def test_the_overview_takes_the_worst_of_what_is_judged() -> None:
-    record = copy.deepcopy(simulated())
-    answers = [line["runs"][-1]["answers"][0] for line in record["scenes"][0]["result"]["lines"]]
-    answers[0]["error"], answers[1]["error"] = 0.25, 1e-3
-    assert overview(record).rows[0][2] == "2.5e-1"
-    answers[0]["allowed"] = None
-    assert overview(record).rows[0][2] == "1.0e-3"
-
-
 def test_a_goal_that_was_missed_is_shown() -> None:
     record = copy.deepcopy(simulated())
     record["scenes"][0]["result"]["missed"] = ["the height is <wrong>"]
@@ -217,7 +208,7 @@ def test_pictures_keep_their_names_apart_and_follow_the_theme() -> None:
     text = inline(one, "bending", 'error "of" <all>')
     root = fromstring(text)
     assert root.get("aria-label") == 'error "of" <all>'
-    assert root.get("style") == "max-width: 13px"
+    assert root.get("style") == "max-width: 13px; min-width: min(36rem, 13px)"
     assert 'id="bending-m1"' in text and 'href="#bending-m1"' in text and "url(#bending-m1)" in text
     assert "unused" not in text and "metadata" not in text and "<style" not in text
     assert 'd="M 1.23 2 L 3 4"' in text

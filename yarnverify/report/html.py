@@ -16,8 +16,8 @@ from yarnverify.report.analysis import analysis_tables, fabric_line
 from yarnverify.report.benchmark import tables, where
 from yarnverify.report.mathml import compared, formula
 from yarnverify.report.pages import mistakes
-from yarnverify.report.scenes import overview, scenes
-from yarnverify.report.simulation import frugality
+from yarnverify.report.scenes import scenes
+from yarnverify.report.simulation import frugality, summary
 from yarnverify.report.svg import inline
 
 _FOLDER = Path(__file__).parent
@@ -90,7 +90,7 @@ def page(
         benchmark=records.get("benchmark"),
         simulation=simulation,
         scenes=scenes(simulation, gallery),
-        overview=overview(simulation) if simulation else None,
+        overview=summary(simulation) if simulation else None,
         frugal=frugality(simulation) if simulation else None,
         photos={scene: b64encode(data).decode() for scene, data in (photos or {}).items()},
         turned=turned or {},
@@ -102,8 +102,9 @@ def page(
 
 
 def _powers(text: str) -> Markup:
-    """Powers such as 2^-53 and N m^2 in raised figures."""
-    return Markup(re.sub(r"(?<=[\w)])\^(-?\d+)", lambda m: f"<sup>{m[1].replace('-', '−')}</sup>", str(escape(text))))
+    """Powers such as 2^-53 and N m^2 in raised figures, *words* in italics."""
+    text = re.sub(r"(?<=[\w)])\^(-?\d+)", lambda m: f"<sup>{m[1].replace('-', '−')}</sup>", str(escape(text)))
+    return Markup(re.sub(r"(?<!\S)\*(\w+)\*", r"<em>\1</em>", text))
 
 
 def _worst(verdicts: list[str]) -> str:

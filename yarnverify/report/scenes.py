@@ -43,31 +43,6 @@ def scenes(record: Mapping[str, Any] | None, gallery: Sequence[Mapping[str, Any]
     return [*found, *(_shown(result, None) for result in gallery if result["scene"] not in known)]
 
 
-def overview(record: Mapping[str, Any]) -> Table:
-    """A row for each answer of each scene: worst error at the largest size, order, and whether that is what it should be."""
-    rows = []
-    for each in record["scenes"]:
-        result = each["result"]
-        last = [line["runs"][-1] for line in result["lines"]]
-        for name in _names(result):
-            answers = [answer for run in last for answer in run["answers"] if answer["name"] == name]
-            answers = [one for one in answers if one["allowed"] is not None] or answers  # ways that are to be judged
-            worst = max(answers, key=lambda one: _size(one["error"]))
-            orders = [one["order"] for one in answers if one["order"] is not None and one["expected order"] is not None]
-            order = f"{min(orders):.2f}" if orders else "exact" if worst["expected order"] is None else "–"
-            rows.append(
-                (
-                    result["scene"].replace("_", " "),
-                    name,
-                    _error(worst["error"]),
-                    order,
-                    _error(worst["allowed"]),
-                )
-            )
-    headings = ("scene", "answer", "relative error", "order", "allowed")
-    return Table("Worst of all ways at the largest size", headings, tuple(rows))
-
-
 def _shown(result: Mapping[str, Any], timings: Mapping[str, Any] | None) -> Shown:
     parameters = tuple(
         (name, f"{_value(own['value'])} {own['unit']}".strip(), own["reason"])
@@ -109,10 +84,6 @@ def _runs(result: Mapping[str, Any], timings: Mapping[str, Any] | None) -> Table
 def _names(result: Mapping[str, Any]) -> list[str]:
     """Answers of a scene, in the order in which its ways have them."""
     return list(dict.fromkeys(answer["name"] for line in result["lines"] for answer in line["runs"][0]["answers"]))
-
-
-def _size(error: float | None) -> float:
-    return float("inf") if error is None else float(error)
 
 
 def _error(value: float | None) -> str:
