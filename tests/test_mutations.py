@@ -309,7 +309,7 @@ def test_both_readings_agree_on_every_mutant(paper: Paper, equation: str) -> Non
                 continue
             if len(kinds) > 1 and not is_zero(right):
                 continue
-            compared = court._compare(left, right)
+            compared = court.evidence.compare(left, right)
             try:
                 same = court.forms.equal(left, right)
             except ZeroDivisionError:

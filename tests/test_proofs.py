@@ -14,9 +14,10 @@ import pytest
 from yarnverify.library import Shelf, errata, shelf_for
 from yarnverify.source import Source
 from yarnverify.symbolic.algebraic import UndefinedError
-from yarnverify.symbolic.court import Court, Verdict, _Comparison
+from yarnverify.symbolic.court import Court, Verdict
 from yarnverify.symbolic.declare import Declarations
 from yarnverify.symbolic.document import Section
+from yarnverify.symbolic.evidence import Comparison
 from yarnverify.symbolic.forward import Evaluation
 from yarnverify.symbolic.prove import read_with, try_document
 from yarnverify.symbolic.reader import read_formula
@@ -203,23 +204,23 @@ TRUE, WRONG = read_formula(r"-k (l_1 - L) \mathbf{d}_1"), read_formula(r"k (l_1 
     [
         ("equal", True, WRONG, "equal as normal forms, different at an exact state"),
         ("equal", False, TRUE, "different as normal forms, equal at every exact state tried"),
-        ("_compare", _Comparison(3), WRONG, "different as normal forms, equal at every exact state tried"),
-        ("_compare", _Comparison(3, ({},)), TRUE, "equal as normal forms, different at an exact state"),
+        ("compare", Comparison(3), WRONG, "different as normal forms, equal at every exact state tried"),
+        ("compare", Comparison(3, ({},)), TRUE, "equal as normal forms, different at an exact state"),
     ],
 )
 def test_readings_that_contradict_each_other_are_inconsistent(
     spring: Court, monkeypatch: pytest.MonkeyPatch, route: str, lie: Any, formula: Expr, reason: str
 ) -> None:
-    if lie == _Comparison(3, ({},)):
-        lie = _Comparison(3, (dict(spring.exact[0].state),))  # a state at which the sides are equal in truth
-    monkeypatch.setattr(spring.forms if route == "equal" else spring, route, lambda *sides: lie, raising=False)
+    if lie == Comparison(3, ({},)):
+        lie = Comparison(3, (dict(spring.evidence.exact[0].state),))  # a state at which the sides are equal in truth
+    monkeypatch.setattr(spring.forms if route == "equal" else spring.evidence, route, lambda *sides: lie, raising=False)
     finding = spring.judge(FORCE, formula)
     assert (finding.verdict, finding.reason) == (Verdict.INCONSISTENT, reason)
 
 
 def test_a_proof_that_balls_do_not_bear_out_is_inconsistent(spring: Court, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spring.forms, "equal", lambda *sides: True)
-    monkeypatch.setattr(spring, "_compare", lambda *sides: _Comparison(3))
+    monkeypatch.setattr(spring.evidence, "compare", lambda *sides: Comparison(3))
     finding = spring.judge(FORCE, WRONG)
     assert (finding.verdict, finding.reason) == (Verdict.INCONSISTENT, "equal in exact readings, apart in balls")
 
@@ -245,7 +246,7 @@ def test_without_a_state_nothing_is_decided(spring: Court, monkeypatch: pytest.M
 
 
 def test_without_a_certificate_nothing_is_refuted(spring: Court, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(spring, "certify", lambda *args: None)
+    monkeypatch.setattr(spring.evidence, "certify", lambda *args: None)
     finding = spring.judge(FORCE, WRONG)
     assert finding.verdict is Verdict.UNDECIDED
     assert "no ball arithmetic" in finding.reason
@@ -255,7 +256,7 @@ def test_balls_that_have_no_value_certify_nothing(spring: Court) -> None:
     state = {
         name: (Fraction(0),) * 3 if name.bold else Fraction(1) for name in spring.names
     }  # both points at one place
-    assert spring.certify(state, FORCE, WRONG) is None
+    assert spring.evidence.certify(state, FORCE, WRONG) is None
 
 
 @pytest.mark.parametrize("formula", [r"\frac{k}{k - k} \mathbf{d}_1", r"(l_1^2 - l_1 l_1)^{-1} \mathbf{d}_1"])

@@ -2,15 +2,20 @@
 
 In the order of work::
 
-    tree, latex, plain          the typed expression tree, and its ways back to LaTeX and to text
-    reader                      LaTeX text -> trees with positions                 (grammar.lark)
+    tree, functions             the typed expression tree; the functions that formulas may use
+    latex, plain                its ways back to LaTeX and to text
+    tokens, grammar, reader     LaTeX text -> trees with positions                 (grammar.lark)
     declare                     energies as a person declares them in derivations/*.py
-    document                    trees -> definitions, assumptions, energies and claims per section
-    reading, normal             reading 1: exact normal forms and derivatives      (SymPy polynomials)
-    numbers, jets, forward      reading 2: forward differentiation over exact rationals, balls or doubles
-    states                      where reading 2 looks
+    sections, document          trees -> definitions, assumptions, energies and claims per section
+    polynomials, square_roots,  reading 1: exact normal forms and derivatives      (FLINT's polynomials)
+      roots, circles, slopes,
+      reading, normal, blocks
+    algebraic, numbers, linear, reading 2: forward differentiation over exact rationals, balls or doubles
+      jets, forward
+    states, signs, evidence     where reading 2 looks, and what it sees there
     court, prove                a verdict on two sides; the trial of a document
-    repair, record              the smallest true change of a refuted chain; all that was found, as JSON
+    changes, repair             the smallest true change of a refuted chain
+    effects, record             what a mistake does; all that was found, as JSON
     measures, laws, scalars     lengths and angles; energies as laws of them; SymPy scalars back to trees
     derive, explain             gradients and Hessians in vector form, proved; the derivation step by step
     emit, modules               reading 3: straight-line NumPy programs, and the modules that hold them

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 
 from yarnverify.symbolic.normal import Field
 from yarnverify.symbolic.polynomials import Quotient
 from yarnverify.symbolic.reading import Value, map_value
-from yarnverify.symbolic.tree import FORCE, Expr, is_zero
+from yarnverify.symbolic.tree import FORCE, Expr, paired
 
 
 class Blocks:
@@ -43,15 +42,6 @@ class Blocks:
         with self.field.claim():
             a, b = (flat(self.field.value(side, self.true)) for side in (left, right))
         return all((p - q).is_zero for p, q in paired(left, right, a, b))
-
-
-def paired(left: Expr, right: Expr, a: list[Any], b: list[Any]) -> list[tuple[Any, Any]]:
-    """Components side by side; the printed 0 stands for as many zeros as are wanted."""
-    if is_zero(right):
-        b = b * len(a)
-    if is_zero(left):
-        a = a * len(b)
-    return list(zip(a, b, strict=True))
 
 
 def flat(value: Value) -> list[Quotient]:

@@ -143,15 +143,15 @@ def _outside_domain(court: Court, declared: Energy, printed: Expr, finding: Find
     def text(assumptions: Iterable[Assumption]) -> str:
         return ", ".join(f"{latex(a.left)} {'>' if a.strict else chr(92) + 'ge'} {latex(a.right)}" for a in assumptions)
 
-    outside = [e for e in court.exact if not all(holds(e, assumption) for assumption in declared.domain)]
+    outside = [e for e in court.evidence.exact if not all(holds(e, assumption) for assumption in declared.domain)]
     assumed = text(court.section.assumptions)
     if declared.elsewhere == "zero" and finding.verdict is Verdict.PROVED:
         for evaluation in outside:
-            witness = court.certify(dict(evaluation.state), ZERO, printed)
+            witness = court.evidence.certify(dict(evaluation.state), ZERO, printed)
             if witness is not None:
                 reason = f"assumed for {assumed}, where in part the declared energy is zero"
                 return Finding(Verdict.REFUTED, reason, witness, mendable=False)
-    if outside and len(outside) == len(court.exact):
+    if outside and len(outside) == len(court.evidence.exact):
         reason = f"assumed for {assumed}, while the energy is declared for {text(declared.domain)}"
         return Finding(Verdict.REFUTED, reason, mendable=False)
     return finding

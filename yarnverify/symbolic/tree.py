@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from fractions import Fraction
+from typing import Any
 
 
 class Type(Enum):
@@ -177,6 +178,15 @@ ONE = number(1)
 def is_zero(expr: Expr) -> bool:
     """Whether the tree is the printed number 0, which equals the zero of every shape."""
     return expr.op == "number" and expr.value == 0
+
+
+def paired(left: Expr, right: Expr, a: list[Any], b: list[Any]) -> list[tuple[Any, Any]]:
+    """Components side by side; the printed 0 stands for as many zeros as are wanted."""
+    if is_zero(right):
+        b = b * len(a)
+    if is_zero(left):
+        a = a * len(b)
+    return list(zip(a, b, strict=True))
 
 
 def rebuild(expr: Expr, change: Callable[[Expr], Expr | None]) -> Expr:
