@@ -170,6 +170,10 @@ def strain(u0: Sliding, u1: Sliding, *, k: Positive["N"], L: Positive["m"]):
 """
 
 
+# well away from states where an angle is 0 or pi, so that plain formulas lose few digits
+SHAPED = {"x0": (0, 0, 0), "x1": (1, 0, 0), "x2": (0.3, 1, 0), "x3": (0.3, -0.4, 0.9), "u0": (0.5,), "u1": (1.5,)}
+
+
 @pytest.fixture(scope="module")
 def kinds(place: Path) -> Path:
     folder = place / "kinds"
@@ -185,16 +189,15 @@ def kinds(place: Path) -> Path:
 def test_kernels_of_any_energy_agree_with_ball_arithmetic(kinds: Path, name: str, variant: str) -> None:
     energy = next(e for e in load_declarations(kinds).energies if e.name == name)
     draw = np.random.default_rng(3)
-    q = draw.uniform(-1, 1, (sum(3 if unknown.bold else 1 for unknown in energy.unknowns), 8))
-    if name == "strain":
-        q[1] = q[0] + 1
+    base = np.concatenate([SHAPED[unknown.label] for unknown in energy.unknowns])
+    q = base[:, None] + draw.uniform(-0.15, 0.15, (len(base), 8))
     values = {p.label: draw.uniform(1.6, 2.0, 8) for p in energy.parameters}
     exact = truth(energy, Points(q, values))
     assert exact.has_derivatives.all()
     found = kernel(variant, name, kinds).evaluate(q, **values)
     for part, true in zip(found, (exact.energy, exact.gradient, exact.hessian), strict=True):
         flat, flat_true = part.reshape(-1, 8), true.reshape(-1, 8)
-        assert (np.abs(flat - flat_true).max(axis=0) <= 1e-7 * np.abs(flat_true).max(axis=0)).all()
+        assert (np.abs(flat - flat_true).max(axis=0) <= 1e-11 * np.abs(flat_true).max(axis=0)).all()
 
 
 def test_what_an_energy_promises_is_what_it_can_keep(kinds: Path) -> None:
