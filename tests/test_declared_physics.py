@@ -67,10 +67,21 @@ def test_units_are_read() -> None:
     assert dimension_of_unit("N m^2") == dimension_of_unit("kg m^3 s^-2") == (1, 3, -2)
     assert dimension_of_unit("Pa m^3") == dimension_of_unit("J") and dimension_of_unit("rad") == dimension_of_unit("1")
     assert unit_text(dimension_of_unit("N")) == "kg m s^-2" and unit_text(dimension_of_unit("1")) == "1"
-    for unit in ("furlong", "m^x", "m/s", "m^-"):
+    assert dimension_of_unit("kg/m/s^2") == dimension_of_unit("Pa") and dimension_of_unit("N/m") == dimension_of_unit(
+        "N m^-1"
+    )
+    for unit in ("furlong", "m^x", "m/", "/s", "m^-"):
         with pytest.raises(DimensionError, match="unknown unit"):
             dimension_of_unit(unit)
-    assert [length_power(unit) for unit in ("kg m^-1", "m s^-2", "N m^2", "J", "1")] == [-2, 1, 2, 1, 0]
+    assert [length_power(unit) for unit in ("kg m^-1", "m s^-2", "N m^2", "J", "1", "Pa", "N/m")] == [
+        -2,
+        1,
+        2,
+        1,
+        0,
+        -2,
+        -1,
+    ]
 
 
 @energy()
