@@ -104,7 +104,9 @@ def test_conjugate_gradients_solve_to_their_tolerance(name: str) -> None:
     matrix = sparse.csc_array(matrix + sparse.diags_array(np.full(made.count, 1e-4 * matrix.diagonal().max())))
     b = np.random.default_rng(1).normal(size=made.count)
     lines = lines_of(fabric, made)
-    assert np.array_equal(np.unique(np.concatenate(lines)), np.arange(made.count))
+    assert np.array_equal(
+        np.unique(np.concatenate([yarn for family in lines for yarn in family])), np.arange(made.count)
+    )
     factor = ConjugateGradients(lines, tolerance=1e-12).factorise(matrix)
     assert factor.negative is None
     x = factor.solve(b)
@@ -188,13 +190,13 @@ def test_conjugate_gradients_notice_what_they_cannot_do() -> None:
 
 def test_a_direction_of_negative_curvature_is_handed_on() -> None:
     matrix = sparse.csc_array([[1.0, 2.0, 0.0], [2.0, 1.0, 0.1], [0.0, 0.1, 1.0]])
-    factor = ConjugateGradients([np.array([0]), np.array([1]), np.array([2])]).factorise(matrix)
+    factor = ConjugateGradients([[np.array([0]), np.array([1]), np.array([2])]]).factorise(matrix)
     with pytest.raises(LinearSolveError) as caught:
         factor.solve(np.array([1.0, -1.0, 0.2]))
     v = caught.value.direction
     assert v is not None and v @ (matrix @ v) < 0
     with pytest.raises(ValueError, match="lies on no line"):
-        ConjugateGradients([np.array([0, 2])]).factorise(matrix)
+        ConjugateGradients([[np.array([0, 2])]]).factorise(matrix)
 
 
 RAW = {"banded": "BandFactor", "multifrontal": "MultifrontalFactor", "superlu": "SuperFactor"}
@@ -226,7 +228,7 @@ def test_a_solver_given_another_pattern_of_the_same_size_starts_afresh(solver: s
     one.eliminate_zeros()
     other.eliminate_zeros()
     assert one.nnz == other.nnz
-    made = DIRECT[solver](_plain(4)) if solver != "gradients" else ConjugateGradients([np.arange(4)])
+    made = DIRECT[solver](_plain(4)) if solver != "gradients" else ConjugateGradients([[np.arange(4)]])
     for matrix in (one, other, one):
         assert np.allclose(made.factorise(matrix).solve(np.ones(4)), np.linalg.solve(matrix.toarray(), np.ones(4)))
 
@@ -266,3 +268,18 @@ def test_unknowns_of_all_sizes_do_not_hide_an_error(name: str) -> None:
     found = Multifrontal(made.nodes, made.coordinates).factorise(matrix).solve(matrix @ x)
     condition = np.linalg.cond(matrix.toarray())
     assert np.abs(found - x).max() <= 100 * EPS * condition
+
+
+@pytest.mark.parametrize("name", ["cloth", "ring", "short yarns"])
+def test_the_preconditioner_is_definite_wherever_the_matrix_is(name: str) -> None:
+    """Near its limit: the matrix less almost its lowest eigenvalue, with all that couples neighbouring yarns."""
+    fabric = {"cloth": lambda: weave("plain", (5, 5)), "ring": lambda: ring(8e-3, 8),
+              "short yarns": lambda: weave("plain", (2, 9))}[name]()  # fmt: skip
+    made = system(fabric, "positions")
+    for seed in range(8):
+        matrix = made.hessian(moved(fabric, seed, size=0.3), definite=True)
+        value = np.linalg.eigvalsh(matrix.toarray())
+        shift = value[0] - 1e-6 * value[-1]
+        matrix = sparse.csc_array(matrix - sparse.diags_array(np.full(made.count, shift)))
+        factor = ConjugateGradients(lines_of(fabric, made)).factorise(matrix)
+        assert np.linalg.norm(matrix @ factor.solve(np.ones(made.count)) - 1) <= 1e-9 * made.count**0.5

@@ -141,6 +141,23 @@ def test_yarns_buckle_above_their_load_and_not_below(ratio: float) -> None:
         assert abs(middle - buckled(ratio)[2]) < 2e-3
 
 
+def test_a_strut_far_beyond_buckling_is_found_from_a_rough_start() -> None:
+    """Sixteen times its load, from a wave of many turns: saddles on the way, and a turn about its axis that costs little."""
+    n = 80
+    thread = yarn(1.0, n)
+    terms = [Term(stretch, segments(thread), {"k_s": 1e4}), Term(bending, bends(thread), {"k_b": 1.0})]
+    loads = np.zeros(thread.size)
+    loads[3 * n : 3 * n + 2] = -40.0, -0.1
+    system = System(thread.Q, terms, thread.positions(np.arange(2, n + 1)), loads)
+    Q = thread.Q.copy()
+    points = thread.points(Q)
+    points[2:, 1] += 0.02 * np.sin(40 * points[2:, 0])
+    found = minimise(system, Q)
+    assert found.negative == 0 and found.iterations <= 100
+    tip = thread.points(found.Q)[-1]
+    assert tip[1] < -0.1 and abs(tip[2]) < 1e-6  # on the side that the small load chooses
+
+
 def test_stages_end_where_the_whole_load_does() -> None:
     thread, system = cantilever(20, 1.0, 1e5)
     whole = minimise(system, thread.Q)

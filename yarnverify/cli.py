@@ -314,12 +314,19 @@ def benchmark(
     Parameters
     ----------
     energy
-        Name of a declared energy, such as bending; all by default.
+        Name of a declared energy, such as bending; all by default. Or simulation: an iteration on cloth of so many crossings
+        (--sizes; 10^2 to 10^5), and a cantilever beside jax and elastica (--peers).
     """
-    from yarnverify.benchmark.command import measure
+    from yarnverify.benchmark.command import measure, measure_simulation
 
+    if energy == "simulation" and threads != 1:
+        _stop("simulations run on one thread: leave --threads out", 2)
     with progress("measuring") as advance:
-        record, asked_and_missing = measure(energy, sizes, peers, threads, rounds, pictures, advance)
+        record, asked_and_missing = (
+            measure_simulation(sizes, peers, rounds, pictures, advance)
+            if energy == "simulation"
+            else measure(energy, sizes, peers, threads, rounds, pictures, advance)
+        )
     if not _json(record, json_file):
         from yarnverify.benchmark.show import show_benchmark
 

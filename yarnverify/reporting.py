@@ -15,12 +15,13 @@ from yarnverify.project import Project, project
 from yarnverify.show import mistake_lines, tally_lines
 from yarnverify.verdicts import nothing_printed, verdicts
 
-MEASURED = ("accuracy", "benchmark", "analysis")  # records that commands of their own write
+MEASURED = ("accuracy", "benchmark", "analysis", "simulation-speed")  # records that commands of their own write
 
 COMMANDS = {
     "accuracy": "yarnverify accuracy --write",
     "benchmark": "yarnverify benchmark --json reports/records/benchmark.json",
     "analysis": "yarnverify analyse --write",
+    "simulation-speed": "yarnverify benchmark simulation --json reports/records/simulation-speed.json",
 }
 
 
@@ -102,7 +103,7 @@ def _page(records: dict[str, Any], folder: Path, name: str) -> str:
 def _draw(folder: Path, measured: dict[str, Any], energies: list[str], lines: list[str]) -> None:
     """Pictures of error against angle and of speed against error, as SVG and PNG."""
     try:
-        from yarnverify.report.analysis_pictures import PICTURES
+        from yarnverify.report import analysis_pictures, simulation_pictures
         from yarnverify.report.pictures import error_against_angle, speed_against_error, write
     except ImportError:
         raise NotRunError("pictures need matplotlib: pip install 'yarnverify[view]'") from None
@@ -119,10 +120,14 @@ def _draw(folder: Path, measured: dict[str, Any], energies: list[str], lines: li
         if benchmark is not None and energy in benchmark["energies"]:
             write(partial(speed_against_error, benchmark, energy), folder / f"{energy}-speed")
             lines.append(f"pictures/{energy}-speed: drawn")
-    if measured["analysis"] is not None:
-        for name, draw in PICTURES.items():
-            write(partial(draw, measured["analysis"]), folder / name)
-            lines.append(f"pictures/{name}: drawn")
+    for kind, drawings in (
+        ("analysis", analysis_pictures.PICTURES),
+        ("simulation-speed", simulation_pictures.PICTURES),
+    ):
+        if measured[kind] is not None:
+            for name, draw in drawings.items():
+                write(partial(draw, measured[kind]), folder / name)
+                lines.append(f"pictures/{name}: drawn")
 
 
 def _measured(out: Path) -> dict[str, Any]:

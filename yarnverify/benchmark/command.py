@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -44,17 +45,58 @@ def measure(
     return record, "; ".join(sorted(reasons))
 
 
+def measure_simulation(
+    crossings: Sequence[int] | None,
+    peers: Sequence[str] | None,
+    rounds: int | None,
+    pictures: Path | None,
+    advance: Callable[[str, int], None],
+) -> tuple[dict[str, Any], str]:
+    """The record of the simulation's speed, and which peers that were named did not run; None stands for the default.
+
+    Raises
+    ------
+    InputError, NotRunError
+        As for ``measure``.
+    """
+    from yarnverify.benchmark.simulation import peers as known
+    from yarnverify.benchmark.simulation import run
+
+    writes = None if pictures is None else _writing(pictures)
+    named = known.PEERS if peers is None else () if list(peers) == ["none"] else tuple(dict.fromkeys(peers))
+    record = run.benchmark_simulation(crossings or run.SIZES, named, run.ROUNDS if rounds is None else rounds, advance)
+    if writes is not None and pictures is not None:
+        from yarnverify.report.simulation_pictures import PICTURES
+
+        for name, draw in PICTURES.items():
+            writes(partial(draw, record), pictures / name)
+    missing = {
+        f"{peer}: not run: {found['not_run'][peer]}"
+        for found in record["cantilever"]["goals"].values()
+        for peer in named
+        if peers is not None and peer in found["not_run"]
+    }
+    return record, "; ".join(sorted(missing))
+
+
 def _drawing(folder: Path) -> Callable[[dict[str, Any], str], None]:
+    write = _writing(folder)
+    from yarnverify.report.pictures import speed_against_error
+
+    def draw(record: dict[str, Any], energy: str) -> None:
+        write(lambda: speed_against_error(record, energy), folder / f"{energy}-speed")
+
+    return draw
+
+
+def _writing(folder: Path) -> Callable[..., Any]:
+    """What writes pictures to a folder, made if need be."""
     try:
-        from yarnverify.report.pictures import speed_against_error, write
+        from yarnverify.report.pictures import write
     except ImportError as error:
         raise NotRunError(f"pictures need {error.name}: pip install yarnverify[view]") from None
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot write: {(error.strerror or str(error)).lower()}") from None
-
-    def draw(record: dict[str, Any], energy: str) -> None:
-        write(lambda: speed_against_error(record, energy), folder / f"{energy}-speed")
-
-    return draw
+    return write

@@ -7,20 +7,21 @@ import sys
 from typing import Any
 
 from yarnverify.report.benchmark import tables, where
+from yarnverify.report.simulation_speed import speed_tables
 from yarnverify.report.table import Table
 
 
 def show_benchmark(record: dict[str, Any]) -> None:
     """Print all tables of a record, and where it was measured."""
-    for energy in record["energies"]:
-        for table in tables(record, energy):
-            if sys.stdout.isatty():
-                _rich(table)
-            else:
-                print("\n".join(plain(table)))
-            for note in table.notes:
-                print(note)
-            print()
+    chosen = speed_tables(record) if "cloth" in record else [t for e in record["energies"] for t in tables(record, e)]
+    for table in chosen:
+        if sys.stdout.isatty():
+            _rich(table)
+        else:
+            print("\n".join(plain(table)))
+        for note in table.notes:
+            print(note)
+        print()
     print(f"Measured in {record['clock']} on {where(record)}; shown, and compared with nothing.")
     print(f"Command: {record['command']}")
 

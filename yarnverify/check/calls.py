@@ -80,7 +80,10 @@ def _module(place: str) -> Any:
                 raise InputError(f"{place}: there is no such file")
             spec = importlib.util.spec_from_file_location(path.stem, path)
             if spec is None or spec.loader is None:
-                raise InputError(f"{place}: is no Python file; a C library ends in .so, .dylib or .dll")
+                raise InputError(
+                    f"{place}: is neither a Python file (.py) nor a C library (.so, .dylib, .dll); source must be compiled "
+                    "first, and a program is called with --command 'PROGRAM {in} {out}'"
+                )
             module = importlib.util.module_from_spec(spec)
             sys.path.insert(0, str(path.resolve().parent))
             sys.modules[path.stem] = module
@@ -239,6 +242,8 @@ def flattened(value: Any, layout: str, n: int, what: str) -> Array:
         value = value.detach().cpu()
     elif hasattr(value, "numpy") and not isinstance(value, np.ndarray):  # Warp
         value = value.numpy()
+    if value is None:
+        raise ValueError("it returns nothing")
     array = np.asarray(value)
     if array.dtype.kind not in "fiub":
         raise ValueError(f"{what} is not made of real numbers but of {array.dtype}")

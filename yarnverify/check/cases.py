@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.accuracy.cells import AMPLIFIED, declared_energy
+from yarnverify.accuracy.cells import AMPLIFIED
 from yarnverify.accuracy.conditioning import condition, hessian_condition
 from yarnverify.accuracy.metrics import UNIT, blocks_of, slices
 from yarnverify.accuracy.regimes import points_of, regimes
@@ -19,7 +19,7 @@ from yarnverify.accuracy.shape import shape_of
 from yarnverify.accuracy.truth import Points, Truth, truth
 from yarnverify.errors import InputError
 from yarnverify.library import derivations
-from yarnverify.symbolic.declare import Energy
+from yarnverify.symbolic.declare import Energy, load_declarations
 
 Array = NDArray[Any]
 EXTREME = ("scales", "out of range")  # sizes that no cloth has
@@ -120,6 +120,12 @@ class Cases:
         return self._known["jumps"]
 
 
+@cache
+def declared(folder: Path) -> tuple[Energy, ...]:
+    """The energies that a folder declares; read once, since that may take longer than a check."""
+    return load_declarations(folder).energies
+
+
 def energy_named(name: str, folder: Path | None) -> Energy:
     """The declared energy of a name, with scalar parameters.
 
@@ -128,7 +134,10 @@ def energy_named(name: str, folder: Path | None) -> Energy:
     InputError
         Where none has that name, or a parameter is a vector.
     """
-    energy = declared_energy(name, folder or derivations())
+    there = declared(folder or derivations())
+    energy = next((energy for energy in there if energy.name == name), None)
+    if energy is None:
+        raise InputError(f"{name}: no such energy; there are {', '.join(energy.name for energy in there)}")
     vectors = [str(parameter.name) for parameter in energy.parameters if parameter.name.bold]
     if vectors:
         raise InputError(

@@ -144,7 +144,7 @@ def _layout(
     parts: Callable[[slice, str], tuple[dict[str, Array], str]], fits: Callable[[dict[str, Array]], list[str]],
 ) -> tuple[str, list[str], str]:  # fmt: skip
     """The first layout in which the function can be called and gives results of a size that means something."""
-    why = []
+    why: dict[str, list[str]] = {}
     for layout in layouts:
         where = _tried(layout, first, len(task.q))
         task.begin(where)
@@ -153,10 +153,14 @@ def _layout(
             return layout, fits(found), kind
         except Exception as error:
             shape = {"single": "one state", "component": "(rows, states)", "element": "(states, rows)"}[layout]
-            why.append(f"{shape}: {type(error).__name__}: {' '.join(str(error).split())[:200]}")
+            text = " ".join(str(error).split())[:200]
+            why.setdefault(text if type(error) is ValueError else f"{type(error).__name__}: {text}", []).append(shape)
     size = task.q.shape[1]
+    if len(why) == 1:
+        raise InputError(f"{task.task['target']}: {next(iter(why))}")
+    tried = "; ".join(f"with {' and '.join(shapes)}: {text}" for text, shapes in why.items())
     raise InputError(
-        f"{task.task['target']}: cannot be called with states of {size} numbers, as --order says. {' | '.join(why)}"
+        f"{task.task['target']}: cannot be called with states of {size} numbers (--order says others): {tried}"
     )
 
 

@@ -88,7 +88,9 @@ def check(
         Where it could not be run here.
     """
     if sum(given is not None for given in (target, command, outputs)) != 1:
-        raise InputError("give one of: a target, --command, --outputs")
+        raise InputError(
+            "give one of: a target (mine.py:function, module:function, libmine.so:function), --command, --outputs"
+        )
     setting = Setting(energy_of(target or command, options), options)
     values = setting.values()
     q = setting.states(values)
@@ -120,7 +122,7 @@ def _judged(
         if diagnosis.status in ("wrong", "approximate"):
             block = narrowed(block, cases, judge.plain & ~np.isinf(block.errors))  # the plainest state shows it best
         found.append((block, diagnosis))
-        advance("judging", len(blocks))
+        advance("judging", len(cases) + len(blocks))
     checked = Checked(name, cases, convention, found, notes=notes, extra={k: v for k, v in results.extra.items() if v})
     checked.left = ran.left
     checked.troubles = _troubles(ran, cases)

@@ -157,7 +157,8 @@ def rows_in_order(order: str | None, labels: Sequence[tuple[str, slice]]) -> tup
     missing = [label for label, index in single.items() if index not in indices]
     twice = [label for label, index in single.items() if indices.count(index) > 1]
     if missing or twice:
-        what = f"{', '.join(missing)} is missing" if missing else f"{', '.join(twice)} comes twice"
+        few, names = len(missing or twice) == 1, ", ".join(missing or twice)
+        what = f"{names} {'is' if few else 'are'} missing" if missing else f"{names} {'comes' if few else 'come'} twice"
         raise InputError(f"--order: {what}; every unknown must come once: {', '.join(places)}")
     return tuple(found)
 

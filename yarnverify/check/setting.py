@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.check.cases import hard_cases
+from yarnverify.check.cases import declared, hard_cases
 from yarnverify.check.conventions import Convention, Output, output_named, rows_in_order
 from yarnverify.check.exchange import write_inputs
 from yarnverify.check.expressions import assignments, evaluated
@@ -51,11 +51,9 @@ def energy_of(target: str | None, options: Options) -> str:
     InputError
         Where it cannot be told.
     """
-    from yarnverify.symbolic.declare import load_declarations
-
     if options.energy is not None:
         return options.energy
-    names = [energy.name for energy in load_declarations(options.derivations or derivations()).energies]
+    names = [energy.name for energy in declared(options.derivations or derivations())]
     said = [target or "", *_functions(target or "")]
     found = [name for name in names if any(name in text for text in said)]
     if len(found) != 1:

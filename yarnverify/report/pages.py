@@ -10,7 +10,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from yarnverify.report.accuracy import accuracy_table, kinds
 from yarnverify.report.analysis import analysis_tables, fabric_line
-from yarnverify.report.benchmark import benchmark_table
+from yarnverify.report.benchmark import benchmark_table, where
+from yarnverify.report.simulation_speed import speed_tables
 
 _TEMPLATES = Environment(
     loader=FileSystemLoader(Path(__file__).parent / "templates"),
@@ -30,7 +31,7 @@ def pages(
     ----------
     records
         ``verdicts``, ``derivations`` and ``kernels``, as written to ``records/``;
-        ``accuracy``, ``benchmark`` and ``analysis`` where measured.
+        ``accuracy``, ``benchmark``, ``analysis`` and ``simulation-speed`` where measured.
     pictures
         Names of the pictures that are in ``pictures/``.
     source
@@ -49,6 +50,7 @@ def pages(
             mistakes=mistakes(found, None),
             place=place,
             analysed=records.get("analysis") is not None,
+            timed=records.get("simulation-speed") is not None,
         )
     }
     for energy, derivation in derived.items():
@@ -75,6 +77,16 @@ def pages(
             tables=analysis_tables(analysis),
             fabric=fabric_line(analysis),
             command=analysis["command"],
+            pictures=pictures,
+        )
+    speed = records.get("simulation-speed")
+    if speed is not None:
+        texts["simulation-speed.md"] = _render(
+            "simulation_speed.md.jinja",
+            tables=speed_tables(speed),
+            where=where(speed),
+            rounds=speed["rounds"],
+            command=speed["command"],
             pictures=pictures,
         )
     return dict(sorted(texts.items()))

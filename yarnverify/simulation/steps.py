@@ -17,7 +17,7 @@ from yarnverify.simulation.stability import downhill, negative_direction
 
 Array = NDArray[Any]
 FEW = 4  # negative eigenvalues up to which their directions are found one by one
-NEAR = 0.1  # of the extent: the length of a step within which its negative directions mean a saddle
+NEAR = 0.1  # of the extent: the longest step where there are negative directions
 NARROW = 24  # band up to which banded Cholesky beats fronts
 
 
@@ -76,8 +76,7 @@ class Steps:
                 step = self._solve(factor, -value.gradient)
                 if not factor.negative:
                     return factor, step
-                if float(np.abs(step).max()) < NEAR * float(np.ptp(Q)):
-                    return factor, _short(Q, downhill(value.matrix, factor, step))
+                return factor, _short(Q, downhill(value.matrix, factor, step), NEAR)
         except LinearSolveError:
             pass
         matrix = self.evaluate(Q, True).matrix
@@ -151,7 +150,7 @@ class Steps:
             self.seconds["solve"] += perf_counter() - start
 
 
-def _short(Q: Array, step: Array) -> Array:
-    """A step of at most the extent: a form without negative curvature may have none at all in some directions."""
-    size, extent = float(np.abs(step).max()), float(np.ptp(Q))
-    return step * (extent / size) if size > extent else step
+def _short(Q: Array, step: Array, share: float = 1.0) -> Array:
+    """A step of at most a share of the extent: in some directions there may be next to no curvature to hold it."""
+    size, longest = float(np.abs(step).max()), share * float(np.ptp(Q))
+    return step * (longest / size) if size > longest else step

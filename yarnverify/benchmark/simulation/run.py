@@ -104,8 +104,9 @@ def _command(sizes: Sequence[int], peers: Sequence[str], rounds: int) -> str:
 def _cloth(side: int, solver: str, rounds: int, advance: Advance, steps: int) -> dict[str, Any]:
     """Seconds per iteration by part, as least of some steps, shares of the memory floor, and memory."""
     cloth = Cloth.made(side, solver)
-    first = cloth.step()
-    found = [cloth.step() for _ in range(1 if side * side >= LONG else rounds)]
+    large = side * side >= LONG
+    cloth.step(1)
+    found = [cloth.step(1 if large else 3) for _ in range(1 if large else rounds)]
     best = {name: min(each[name] for each in found) for name in (*PARTS, "iteration")}
     floors = cloth.floors()
     bandwidth = {name: min(paired({"copy": copying(size)}, 3, time.process_time)["copy"])
@@ -115,7 +116,6 @@ def _cloth(side: int, solver: str, rounds: int, advance: Advance, steps: int) ->
         "unknowns": cloth.dynamics.system.count,
         "elements": sum(term.table.count for term in cloth.dynamics.system.terms),
         "engine": cloth.dynamics.system.engine,
-        "iterations": first["iterations"],
         "inner": round(found[0]["inner"], 1),
         "seconds": {name: _short(value) for name, value in best.items()},
         "floor": {name: _short(value) for name, value in bandwidth.items()},
@@ -187,7 +187,7 @@ def _cantilever(goal: float, peers: Sequence[str], rounds: int, advance: Callabl
 
 def _maker(name: str, goal: float) -> tuple[Callable[[int], Solve], Sequence[str], Sequence[int]]:
     if name in OWN:
-        engine = "numpy" if name == OWN[1] else "compiled"
+        engine = "numpy" if name.endswith("NumPy") else "compiled"
         if engine == "compiled":
             importlib.import_module("numba")
         return lambda n: ours(n, ALPHA, engine), ["numba"] if engine == "compiled" else [], SEGMENTS

@@ -7,7 +7,7 @@ after the other in one banded matrix. Sums are NumPy's own, not those of BLAS, w
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,8 @@ Array = NDArray[Any]
 COLUMNS = 32768  # of the matrix at a time
 
 
-def lines_of(fabric: Any, system: Any) -> list[Array]:
-    """The unknowns along the yarns of each family, one yarn after the other, in the order of ``system.active``."""
+def lines_of(fabric: Any, system: Any) -> list[list[Array]]:
+    """The unknowns along each yarn of each family, places in ``system.active``."""
     families: dict[str, list[Array]] = {}
     for yarn in fabric.yarns:
         entries = np.concatenate([fabric.position(yarn.nodes), np.asarray(yarn.slides)[:, None]], axis=1)
@@ -29,11 +29,10 @@ def lines_of(fabric: Any, system: Any) -> list[Array]:
             entries = entries[:-2]
         found = system.pattern.local[entries.reshape(-1)]
         families.setdefault(yarn.family, []).append(found[found >= 0])
-    lines = [np.concatenate(parts).astype(np.int64) for parts in families.values()]
     covered = np.zeros(system.count, bool)
-    for line in lines:
-        covered[line] = True
-    return [*lines, *([np.flatnonzero(~covered)] if not covered.all() else [])]
+    for parts in families.values():
+        covered[np.concatenate(parts)] = True
+    return [*families.values(), *([[np.flatnonzero(~covered)]] if not covered.all() else [])]
 
 
 class ConjugateGradients:
@@ -41,17 +40,19 @@ class ConjugateGradients:
 
     Parameters
     ----------
-    lines
-        Unknowns of each family of yarns in order along them; each unknown is in one family at least.
+    families
+        For each family of yarns the unknowns of each yarn in order along it; each unknown is in one family at least.
     tolerance
         Residual at which to stop, relative to the right-hand side.
     iterations
         Greatest number of iterations.
     """
 
-    def __init__(self, lines: Sequence[Array], tolerance: float = 1e-10, iterations: int = 5000) -> None:
-        self.lines, self.tolerance, self.iterations = list(lines), tolerance, iterations
-        self._bands: list[tuple[int, Array, Array]] | None = None
+    def __init__(self, families: Sequence[Sequence[Array]], tolerance: float = 1e-10, iterations: int = 5000) -> None:
+        self.lines = [np.concatenate([np.empty(0, np.int64), *yarns]) for yarns in families]
+        self._yarns = [np.repeat(np.arange(len(yarns), dtype=np.int32), [len(y) for y in yarns]) for yarns in families]
+        self.tolerance, self.iterations = tolerance, iterations
+        self._bands: list[_Band] | None = None
         self._known: Any = None
 
     @one_thread()
@@ -66,12 +67,14 @@ class ConjugateGradients:
         if self._bands is None or not same_pattern(matrix, self._known):
             if np.unique(np.concatenate([np.empty(0, np.int64), *self.lines])).size != matrix.shape[0]:
                 raise ValueError("conjugate gradients: an unknown lies on no line")
-            self._bands = [_band(matrix, line) for line in self.lines]
+            self._bands = [_band(matrix, line, yarn) for line, yarn in zip(self.lines, self._yarns, strict=True)]
             self._known = pattern_of(matrix)
         factors = []
-        for line, (width, source, target) in zip(self.lines, self._bands, strict=True):
+        for line, (width, source, target, lost, diagonal) in zip(self.lines, self._bands, strict=True):
             band = np.zeros((line.size, width + 1))
             band.reshape(-1)[target] = matrix.data[source]
+            for at in diagonal:
+                np.add.at(band[:, 0], at, np.abs(matrix.data[lost]))
             factor, info = lapack.dpbtrf(band.T, lower=1, overwrite_ab=1)
             if info:
                 raise LinearSolveError("conjugate gradients: the block of a yarn is not positive definite")
@@ -79,24 +82,44 @@ class ConjugateGradients:
         return Gradients(matrix, factors, self.tolerance, self.iterations)
 
 
-def _band(matrix: Any, line: Array) -> tuple[int, Array, Array]:
-    """Width of the band of a line, and where its entries come from and go to."""
+class _Band(NamedTuple):
+    """Width of the band of a line, and where its entries come from and go to.
+
+    What lies outside of the band is lost to it; for its size both diagonal entries grow, which keeps the band positive definite
+    wherever the matrix is. What couples one yarn with another is left out: a matrix without such blocks stays definite.
+    """
+
+    width: int
+    source: Array
+    target: Array
+    lost: Array
+    diagonal: tuple[Array, Array]
+
+
+def _band(matrix: Any, line: Array, yarn: Array) -> _Band:
     place = np.full(matrix.shape[0], -1, np.int32)
     place[line] = np.arange(line.size, dtype=np.int32)
-    # entries between different yarns that lie one after the other belong to the band as well, if they are near
     counts = np.zeros(line.size, np.int64)
-    for _, _, distance in _inside(matrix, place, line.size):
+    for _, _, distance in _inside(matrix, place, yarn):
         counts += np.bincount(distance, minlength=line.size)
     width = _width(counts)
     kind: Any = np.int32 if max(matrix.nnz, line.size * (width + 1)) < 2**31 else np.int64
-    found = [(at.astype(kind), (column * (width + 1) + distance).astype(kind))
-             for at, column, distance in _inside(matrix, place, width + 1)]  # fmt: skip
-    source, target = (np.concatenate([np.empty(0, kind), *parts]) for parts in zip(*found, strict=True))
-    return width, source, target
+    near: list[tuple[Array, Array]] = [(np.empty(0, kind),) * 2]
+    far: list[tuple[Array, Array, Array]] = [(np.empty(0, kind),) * 3]
+    for at, column, distance in _inside(matrix, place, yarn):
+        inside = distance <= width
+        target = column * (width + 1) + distance
+        near.append((at[inside].astype(kind), target[inside].astype(kind)))
+        outside = ~inside
+        row = column + distance
+        far.append((at[outside].astype(kind), column[outside].astype(kind), row[outside].astype(kind)))
+    source, target = (np.concatenate(parts) for parts in zip(*near, strict=True))
+    lost, column, row = (np.concatenate(parts) for parts in zip(*far, strict=True))
+    return _Band(width, source, target, lost, (column, row))
 
 
-def _inside(matrix: Any, place: Array, reach: int) -> Iterator[tuple[Array, Array, Array]]:
-    """Entries of the lower triangle of a line nearer to its diagonal than ``reach``: where, column in the line, distance.
+def _inside(matrix: Any, place: Array, yarn: Array) -> Iterator[tuple[Array, Array, Array]]:
+    """Entries of the lower triangle of a line within its yarns: where, column in the line, distance from the diagonal.
 
     Some columns of the matrix at a time, since what is needed on the way is larger than the band.
     """
@@ -104,9 +127,11 @@ def _inside(matrix: Any, place: Array, reach: int) -> Iterator[tuple[Array, Arra
         last = min(first + COLUMNS, matrix.shape[1])
         part = slice(int(matrix.indptr[first]), int(matrix.indptr[last]))
         column = np.repeat(place[first:last], np.diff(matrix.indptr[first : last + 1])).astype(np.int64)
-        distance = place[matrix.indices[part]] - column
-        near = np.flatnonzero((column >= 0) & (distance >= 0) & (distance < reach))
-        yield part.start + near, column[near], distance[near]
+        row = place[matrix.indices[part]]
+        mine = np.flatnonzero((column >= 0) & (row >= column))
+        row, column = row[mine], column[mine]
+        same = yarn[row] == yarn[column]
+        yield part.start + mine[same], column[same], row[same] - column[same]
 
 
 def _width(counts: Array) -> int:
