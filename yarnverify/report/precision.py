@@ -32,24 +32,31 @@ def write_precision(result: Mapping[str, Any], timings: Mapping[str, Any], path:
 
 def precision(result: Mapping[str, Any], timings: Mapping[str, Any]) -> Figure:
     """Relative error against seconds."""
-    answers = [answer["name"] for answer in result["lines"][0]["runs"][0]["answers"]]
+    answers = list(dict.fromkeys(answer["name"] for line in result["lines"] for answer in line["runs"][0]["answers"]))
     figure = Figure(figsize=(0.6 + 3.4 * len(answers), 3.9), layout="constrained")
     panels = figure.subplots(1, len(answers), sharex=True, squeeze=False)[0]
     names = [line["name"] for line in result["lines"]]
-    for k, (axes, answer) in enumerate(zip(panels, answers, strict=True)):
+    for axes, answer in zip(panels, answers, strict=True):
         for line, timed in zip(result["lines"], timings["lines"], strict=True):
-            _line(axes, line, timed, k, names)
-        _dress(axes, result, answer, k)
+            _line(axes, line, timed, answer, names)
+        _dress(axes, result, answer)
     panels[0].set_ylabel("relative error")
-    handles, labels = panels[0].get_legend_handles_labels()
+    handles, labels = max((axes.get_legend_handles_labels() for axes in panels), key=lambda shown: len(shown[1]))
     figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)), frameon=False)
     figure.supxlabel(f"seconds; numbers beside the marks are {result['size']}", fontsize=8)
     return figure
 
 
-def _line(axes: Axes, line: Mapping[str, Any], timed: Mapping[str, Any], k: int, names: list[str]) -> None:
+def _of(line: Mapping[str, Any], answer: str) -> list[Mapping[str, Any]]:
+    """An answer in every run of a line; none where this way of solving does not have it."""
+    return [found for run in line["runs"] for found in run["answers"] if found["name"] == answer]
+
+
+def _line(axes: Axes, line: Mapping[str, Any], timed: Mapping[str, Any], answer: str, names: list[str]) -> None:
+    errors = [max(found["error"], LEAST) for found in _of(line, answer)]
+    if not errors:
+        return
     seconds = [run["seconds"] for run in timed["runs"]]
-    errors = [max(run["answers"][k]["error"], LEAST) for run in line["runs"]]
     style = mark(line["name"], names)
     axes.plot(
         seconds, errors, color=style.colour, linestyle=style.line, marker=style.marker, markersize=5, linewidth=1.1,
@@ -61,18 +68,18 @@ def _line(axes: Axes, line: Mapping[str, Any], timed: Mapping[str, Any], k: int,
         )
 
 
-def _dress(axes: Axes, result: Mapping[str, Any], answer: str, k: int) -> None:
+def _dress(axes: Axes, result: Mapping[str, Any], answer: str) -> None:
     axes.set_title(answer, fontsize=8)
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.margins(x=0.12)
-    runs = [run["answers"][k] for line in result["lines"] for run in line["runs"]]
-    known = [answer["allowed"] for answer in runs if answer["allowed"] is not None]
+    found = [one for line in result["lines"] for one in _of(line, answer)]
+    known = [one["allowed"] for one in found if one["allowed"] is not None]
     if known:
         axes.axhline(max(known), color="0.4", linewidth=0.7, linestyle=(0, (1, 3)))
         axes.annotate("allowed", (1, max(known)), xycoords=("axes fraction", "data"), xytext=(-2, 2),
                       textcoords="offset points", ha="right", fontsize=6, color="0.3")  # fmt: skip
-    heights = [max(answer["error"], LEAST) for answer in runs] + known
+    heights = [max(one["error"], LEAST) for one in found] + known
     axes.set_ylim(min(heights) / 4, max(heights) * 6)
     axes.yaxis.set_major_locator(LogLocator(numticks=8))
     axes.yaxis.set_minor_formatter(NullFormatter())

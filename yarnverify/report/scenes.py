@@ -43,8 +43,8 @@ def overview(record: Mapping[str, Any]) -> Table:
     for each in record["scenes"]:
         result = each["result"]
         last = [line["runs"][-1] for line in result["lines"]]
-        for number, answer in enumerate(last[0]["answers"]):
-            answers = [run["answers"][number] for run in last]
+        for name in dict.fromkeys(answer["name"] for run in last for answer in run["answers"]):
+            answers = [answer for run in last for answer in run["answers"] if answer["name"] == name]
             answers = [one for one in answers if one["allowed"] is not None] or answers  # ways that are to be judged
             worst = max(answers, key=lambda one: _size(one["error"]))
             orders = [one["order"] for one in answers if one["order"] is not None and one["expected order"] is not None]
@@ -52,7 +52,7 @@ def overview(record: Mapping[str, Any]) -> Table:
             rows.append(
                 (
                     result["scene"].replace("_", " "),
-                    answer["name"],
+                    name,
                     _error(worst["error"]),
                     order,
                     _error(worst["allowed"]),
