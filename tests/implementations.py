@@ -138,6 +138,20 @@ def bending_sign_of_a_term(q: Any, k_b: Any) -> Any:
     return e, g, h
 
 
+def bending_chord(q: Any, k_b: Any) -> Any:
+    """2 (1 - cos) for the squared angle, and the lengths of the segments for the yarn's."""
+    _, g, _ = _of(bending, q, k_b=k_b)
+    a, b = q[3:6] - q[:3], q[:3] - q[6:9]
+    l_1, l_2 = np.sqrt((a * a).sum(axis=0)), np.sqrt((b * b).sum(axis=0))
+    cosine = (a * b).sum(axis=0) / (l_1 * l_2)
+    theta = np.arccos(cosine)
+    return {
+        "energy": 2 * k_b * (1 - cosine) / (q[9] - q[10]),
+        "x1": g[3:6] * (q[9] - q[10]) / (l_1 + l_2),
+        "x2": g[6:9] * np.sin(theta) / theta,
+    }
+
+
 def bending_swapped(q: Any, k_b: Any) -> Any:
     e, g, h = _of(bending, q, k_b=k_b)
     g[3:9] = np.concatenate([g[6:9], g[3:6]])

@@ -98,6 +98,9 @@ def test_single_precision_is_held_to_its_own_unit() -> None:
         ("bending_transposed", "wrong: H[x1,x2]: is transposed"),
         ("stretch_without_projection", "wrong: H[x1,x1]: is off by a multiple of P_1: that term is wrong, or missing"),
         ("bending_sign_of_a_term", "wrong: H[x1,x1]: is off by a multiple of d_1 d_2^T P_1: that term is wrong"),
+        ("bending_chord", "wrong: E[]: is 4 sin(angle/2)^2/angle^2 times what it should be"),
+        ("bending_chord", "wrong: G[x1]: lacks a factor (|x1 - x0| + |x0 - x2|)/(u1 - u2)"),
+        ("bending_chord", "wrong: G[x2]: lacks a factor angle/sin(angle)"),
         ("bending_swapped", "wrong: G[x1]: is the block x2: indices are swapped"),
         ("bending_left_out", "wrong: H[u1,u1]: is zero, as if left out"),
         ("shear_gauss_newton", "holds first derivatives only (Gauss-Newton)"),
@@ -126,6 +129,23 @@ def test_losses_are_called_by_their_names(name: str, expected: str) -> None:
     found = checked(name)
     assert not found.passes
     assert expected in said(found)
+
+
+@pytest.mark.parametrize(("relative", "passes"), [(1e-16, True), (1e-12, False), (-1e-12, False)])
+def test_every_block_is_judged_by_itself_and_relative_to_itself(relative: float, passes: bool) -> None:
+    from yarnverify.check.cases import hard_cases
+    from yarnverify.check.conventions import Results
+    from yarnverify.check.judge import block_places, judged
+    from yarnverify.kernels.accurate import bending
+
+    cases = hard_cases("bending", None, "float64", 6, ONE, False, (("k_b", 1e-30),))
+    all_given = {"E": np.ones((), bool), "G": np.ones(11, bool), "H": np.ones((11, 11), bool)}
+    for kind in "EGH":
+        for name, place in block_places(kind, cases):
+            results = Results(*bending.evaluate(cases.points.q, **cases.points.parameters), all_given)
+            results.part(kind)[place] *= 1 + relative
+            failing = [(b.kind, b.name) for b in judged(results, cases, np.ones(len(cases), bool)) if not b.passes]
+            assert failing == ([] if passes else [(kind, name)])
 
 
 def test_only_the_mistaken_blocks_fail() -> None:

@@ -477,6 +477,9 @@ def simulate(
     resume: Annotated[bool, Parameter(negative="", help="Go on with the run in --out that was interrupted.")] = False,
     every: Annotated[float, Parameter(help="Seconds between states that are kept in --out.")] = 10.0,
     pictures: Annotated[bool, Parameter(help="Draw what was found into --out.")] = True,
+    write: Annotated[
+        bool, Parameter(negative="", help="Write the record of all scenes into --out, reports by default.")
+    ] = False,
     json_file: Json = None,
 ) -> None:
     """A reference scene, compared with its known answer.
@@ -486,14 +489,18 @@ def simulate(
     scene
         Its name, or a Python file of your own that declares one. All are listed without.
     """
-    from yarnverify.simulation.command import listing
+    from yarnverify.simulation.command import listing, record_all
     from yarnverify.simulation.command import simulate as run
     from yarnverify.simulation.show import study_lines
 
-    if scene is None:
+    if scene is None and not write:
         print("\n".join(listing()))
         return
     with time_left() as tell:
+        if scene is None:
+            path, missed = record_all(out or Path("reports"), tell)
+            print("\n".join([*missed, f"{path}: written"]))
+            sys.exit(1 if missed else 0)
         found, lines = run(scene, size or (), settings or (), solver, out, resume, every, pictures, tell)
     if not _json({"result": found.result, "timings": found.timings}, json_file):
         print("\n".join([*study_lines(found.result, found.timings), *lines]))

@@ -15,12 +15,13 @@ from yarnverify.project import Project, project
 from yarnverify.show import mistake_lines, tally_lines
 from yarnverify.verdicts import nothing_printed, verdicts
 
-MEASURED = ("accuracy", "benchmark", "analysis", "simulation-speed")  # records that commands of their own write
+MEASURED = ("accuracy", "benchmark", "analysis", "simulation", "simulation-speed")  # of commands of their own
 
 COMMANDS = {
     "accuracy": "yarnverify accuracy --write",
     "benchmark": "yarnverify benchmark --json reports/records/benchmark.json",
     "analysis": "yarnverify analyse --write",
+    "simulation": "yarnverify simulate --write",
     "simulation-speed": "yarnverify benchmark simulation --json reports/records/simulation-speed.json",
 }
 
@@ -105,6 +106,7 @@ def _draw(folder: Path, measured: dict[str, Any], energies: list[str], lines: li
     try:
         from yarnverify.report import analysis_pictures, simulation_pictures
         from yarnverify.report.pictures import error_against_angle, speed_against_error, write
+        from yarnverify.report.precision import precision
     except ImportError:
         raise NotRunError("pictures need matplotlib: pip install 'yarnverify[view]'") from None
 
@@ -128,6 +130,11 @@ def _draw(folder: Path, measured: dict[str, Any], energies: list[str], lines: li
             for name, draw in drawings.items():
                 write(partial(draw, measured[kind]), folder / name)
                 lines.append(f"pictures/{name}: drawn")
+    if measured["simulation"] is not None:
+        for each in measured["simulation"]["scenes"]:
+            name = each["result"]["scene"]
+            write(partial(precision, each["result"], each["timings"]), folder / f"{name}-precision")
+            lines.append(f"pictures/{name}-precision: drawn")
 
 
 def _measured(out: Path) -> dict[str, Any]:

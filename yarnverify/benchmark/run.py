@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import platform
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from yarnverify.benchmark.timing import Clock, Spread, paired, speedups, spread,
 from yarnverify.benchmark.ways import Way, degrees_of_freedom, outputs_bytes
 from yarnverify.errors import InputError
 from yarnverify.library import derivations
+from yarnverify.machine import environment
 from yarnverify.symbolic.declare import Energy, load_declarations
 
 SIZES = (1, 10, 100, 1000, 10_000, 100_000, 1_000_000)
@@ -134,32 +134,6 @@ def pinned(threads: int) -> Iterator[int | None]:
         yield len(chosen)
     finally:
         os.sched_setaffinity(0, before)
-
-
-def environment(packages: Sequence[str], processors: int | None) -> dict[str, Any]:
-    """Where the measurement was made."""
-    from importlib.metadata import version
-
-    names = dict.fromkeys(["numpy", *packages])
-    return {
-        "processor": _processor(),
-        "cores": os.cpu_count(),
-        "held to processors": processors,
-        "system": platform.system(),
-        "python": platform.python_version(),
-        "packages": {name: version(name) for name in names},
-    }
-
-
-def _processor() -> str:
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
-            for line in file:
-                if line.startswith("model name"):
-                    return line.split(":", 1)[1].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()
 
 
 def _measure(

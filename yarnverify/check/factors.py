@@ -69,13 +69,17 @@ def quantities(cases: Cases) -> dict[str, Array]:
     for edge in shape.edges:
         difference = cases.points.q[rows[edge.head.label]] - cases.points.q[rows[edge.tail.label]]
         found[f"|{edge.head.label} - {edge.tail.label}|"] = np.sqrt((difference**2).sum(axis=0))
+    if len(shape.edges) == 2:  # what stands in for the rest length in other discretisations
+        first, second = (name for name in found if name.startswith("|"))
+        found[f"({first} + {second})"] = found[first] + found[second]
     for a, b in combinations(shape.sliding, 2):
         found[_difference(cases, a, b)] = np.abs(
             cases.points.q[rows[a.label].start] - cases.points.q[rows[b.label].start]
         )
     if shape.angle:
         angle = angles(cases)
-        found["angle"], found["sin(angle)"], found["cos(angle)"] = angle, np.sin(angle), np.abs(np.cos(angle))
+        found |= {"angle": angle, "sin(angle)": np.sin(angle), "cos(angle)": np.abs(np.cos(angle))}
+        found |= {"sin(angle/2)": np.sin(angle / 2), "tan(angle/2)": np.tan(angle / 2)}
     return found
 
 

@@ -17,6 +17,7 @@ from yarnverify.report.benchmark import tables, where
 from yarnverify.report.mathml import compared, formula
 from yarnverify.report.pages import mistakes
 from yarnverify.report.scenes import overview, scenes
+from yarnverify.report.simulation import frugality
 from yarnverify.report.svg import inline
 
 _FOLDER = Path(__file__).parent
@@ -87,6 +88,7 @@ def page(
         simulation=simulation,
         scenes=scenes(simulation),
         overview=overview(simulation) if simulation else None,
+        frugal=frugality(simulation) if simulation else None,
         photos={scene: b64encode(data).decode() for scene, data in (photos or {}).items()},
         turned=turned or {},
         errors={name: _errors(records.get("accuracy"), name) for name in derived},

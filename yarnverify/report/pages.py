@@ -11,6 +11,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from yarnverify.report.accuracy import accuracy_table, kinds
 from yarnverify.report.analysis import analysis_tables, fabric_line
 from yarnverify.report.benchmark import benchmark_table, where
+from yarnverify.report.simulation import frugality, studies, summary
 from yarnverify.report.simulation_speed import speed_tables
 
 _TEMPLATES = Environment(
@@ -31,7 +32,7 @@ def pages(
     ----------
     records
         ``verdicts``, ``derivations`` and ``kernels``, as written to ``records/``;
-        ``accuracy``, ``benchmark``, ``analysis`` and ``simulation-speed`` where measured.
+        ``accuracy``, ``benchmark``, ``analysis``, ``simulation`` and ``simulation-speed`` where measured.
     pictures
         Names of the pictures that are in ``pictures/``.
     source
@@ -50,6 +51,7 @@ def pages(
             mistakes=mistakes(found, None),
             place=place,
             analysed=records.get("analysis") is not None,
+            simulated=records.get("simulation") is not None,
             timed=records.get("simulation-speed") is not None,
         )
     }
@@ -77,6 +79,17 @@ def pages(
             tables=analysis_tables(analysis),
             fabric=fabric_line(analysis),
             command=analysis["command"],
+            pictures=pictures,
+        )
+    simulation = records.get("simulation")
+    if simulation is not None:
+        texts["simulation.md"] = _render(
+            "simulation.md.jinja",
+            record=simulation,
+            where=where(simulation),
+            summary=summary(simulation),
+            frugality=frugality(simulation),
+            studies={each["result"]["scene"]: studies(each) for each in simulation["scenes"]},
             pictures=pictures,
         )
     speed = records.get("simulation-speed")

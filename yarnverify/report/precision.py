@@ -32,31 +32,34 @@ def write_precision(result: Mapping[str, Any], timings: Mapping[str, Any], path:
 
 def precision(result: Mapping[str, Any], timings: Mapping[str, Any]) -> Figure:
     """Relative error against seconds."""
-    answers = list(dict.fromkeys(answer["name"] for line in result["lines"] for answer in line["runs"][0]["answers"]))
+    answers = list(dict.fromkeys(name for line in result["lines"] for name in _errors(line)))
     figure = Figure(figsize=(0.6 + 3.4 * len(answers), 3.9), layout="constrained")
     panels = figure.subplots(1, len(answers), sharex=True, squeeze=False)[0]
     names = [line["name"] for line in result["lines"]]
     for axes, answer in zip(panels, answers, strict=True):
         for line, timed in zip(result["lines"], timings["lines"], strict=True):
-            _line(axes, line, timed, answer, names)
+            if answer in _errors(line):
+                _line(axes, line, timed, answer, names)
         _dress(axes, result, answer)
     panels[0].set_ylabel("relative error")
     handles, labels = max((axes.get_legend_handles_labels() for axes in panels), key=lambda shown: len(shown[1]))
     figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)), frameon=False)
-    figure.supxlabel(f"seconds; numbers beside the marks are {result['size']}", fontsize=8)
+    figure.supxlabel(f"seconds of processor time; numbers beside the marks are {result['size']}", fontsize=8)
     return figure
 
 
-def _of(line: Mapping[str, Any], answer: str) -> list[Mapping[str, Any]]:
-    """An answer in every run of a line; none where this way of solving does not have it."""
-    return [found for run in line["runs"] for found in run["answers"] if found["name"] == answer]
+def _errors(line: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
+    """What a way found for each answer, size by size."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for run in line["runs"]:
+        for answer in run["answers"]:
+            found.setdefault(answer["name"], []).append(answer)
+    return found
 
 
 def _line(axes: Axes, line: Mapping[str, Any], timed: Mapping[str, Any], answer: str, names: list[str]) -> None:
-    errors = [max(found["error"], LEAST) for found in _of(line, answer)]
-    if not errors:
-        return
     seconds = [run["seconds"] for run in timed["runs"]]
+    errors = [max(found["error"], LEAST) for found in _errors(line)[answer]]
     style = mark(line["name"], names)
     axes.plot(
         seconds, errors, color=style.colour, linestyle=style.line, marker=style.marker, markersize=5, linewidth=1.1,
@@ -73,13 +76,13 @@ def _dress(axes: Axes, result: Mapping[str, Any], answer: str) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.margins(x=0.12)
-    found = [one for line in result["lines"] for one in _of(line, answer)]
-    known = [one["allowed"] for one in found if one["allowed"] is not None]
+    runs = [found for line in result["lines"] for found in _errors(line).get(answer, [])]
+    known = [found["allowed"] for found in runs if found["allowed"] is not None]
     if known:
         axes.axhline(max(known), color="0.4", linewidth=0.7, linestyle=(0, (1, 3)))
         axes.annotate("allowed", (1, max(known)), xycoords=("axes fraction", "data"), xytext=(-2, 2),
                       textcoords="offset points", ha="right", fontsize=6, color="0.3")  # fmt: skip
-    heights = [max(one["error"], LEAST) for one in found] + known
+    heights = [max(found["error"], LEAST) for found in runs] + known
     axes.set_ylim(min(heights) / 4, max(heights) * 6)
     axes.yaxis.set_major_locator(LogLocator(numticks=8))
     axes.yaxis.set_minor_formatter(NullFormatter())

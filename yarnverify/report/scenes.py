@@ -43,7 +43,7 @@ def overview(record: Mapping[str, Any]) -> Table:
     for each in record["scenes"]:
         result = each["result"]
         last = [line["runs"][-1] for line in result["lines"]]
-        for name in dict.fromkeys(answer["name"] for run in last for answer in run["answers"]):
+        for name in _names(result):
             answers = [answer for run in last for answer in run["answers"] if answer["name"] == name]
             answers = [one for one in answers if one["allowed"] is not None] or answers  # ways that are to be judged
             worst = max(answers, key=lambda one: _size(one["error"]))
@@ -79,7 +79,7 @@ def _shown(result: Mapping[str, Any], timings: Mapping[str, Any] | None) -> Show
 
 
 def _runs(result: Mapping[str, Any], timings: Mapping[str, Any] | None) -> Table:
-    names = [answer["name"] for answer in result["lines"][0]["runs"][0]["answers"]]
+    names = _names(result)
     headings = [result["compared"], result["size"], "unknowns", "iterations"]
     for name in names:
         headings += [f"{name}: error", "order"]
@@ -87,7 +87,9 @@ def _runs(result: Mapping[str, Any], timings: Mapping[str, Any] | None) -> Table
     for number, line in enumerate(result["lines"]):
         for place, run in enumerate(line["runs"]):
             cells = [line["name"], str(run["size"]), str(run["unknowns"]), str(run["iterations"])]
-            for answer in run["answers"]:
+            by_name = {answer["name"]: answer for answer in run["answers"]}
+            for name in names:
+                answer = by_name.get(name, {"error": None, "order": None})  # not every way has every answer
                 cells += [_error(answer["error"]), "" if answer["order"] is None else f"{answer['order']:.2f}"]
             if timings is not None:
                 cells.append(f"{timings['lines'][number]['runs'][place]['seconds']:.2g}")
@@ -95,6 +97,11 @@ def _runs(result: Mapping[str, Any], timings: Mapping[str, Any] | None) -> Table
     if timings is not None:
         headings.append("seconds")
     return Table("Relative errors", tuple(headings), tuple(rows))
+
+
+def _names(result: Mapping[str, Any]) -> list[str]:
+    """Answers of a scene, in the order in which its ways have them."""
+    return list(dict.fromkeys(answer["name"] for line in result["lines"] for answer in line["runs"][0]["answers"]))
 
 
 def _size(error: float | None) -> float:

@@ -93,6 +93,15 @@ def listing() -> list[str]:
     return [f"{scene.name:<{width}}  {scene.title}" for scene in SCENES]
 
 
+def record_all(folder: Path, tell: Tell) -> tuple[Path, list[str]]:
+    """Run every scene that has a known answer and write the record below a folder of reports; goals that were missed."""
+    from yarnverify.simulation.record import measure, write
+    from yarnverify.simulation.scenes import SCENES
+
+    record = measure([scene for scene in SCENES if scene.validates], tell)
+    return write(record, folder), [line for each in record["scenes"] for line in each["result"]["missed"]]
+
+
 def simulate(
     name: str, sizes: Sequence[int], given: Sequence[str], solver: str | None, out: Path | None, resume: bool, every: float,
     pictures: bool, tell: Tell,

@@ -21,7 +21,7 @@ def answer(known: Known, outcome: Outcome, large: bool) -> dict[str, Any]:
         Whether the size is at least the largest one of the scene, at which an answer with an order has to be good.
     """
     found, exact, error = known.compared(outcome)
-    allowed = max(known.within, 3 * known.floor) if large or known.order is None else None
+    allowed = float(max(known.within, 3 * known.floor)) if large or known.order is None else None
     return {
         "name": known.name,
         "unit": known.unit,
@@ -31,7 +31,7 @@ def answer(known: Known, outcome: Outcome, large: bool) -> dict[str, Any]:
         "allowed": allowed,
         "order": None,
         "expected order": known.order,
-        "order is judged": known.order is not None and error > 30 * known.floor,
+        "order is judged": known.order is not None and bool(error > 30 * known.floor),
     }
 
 

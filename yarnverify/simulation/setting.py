@@ -78,6 +78,11 @@ class Known:
     scale: float | None = None
     floor: float = 0.0
 
+    @property
+    def size(self) -> float:
+        """What errors are relative to; 1 where that would be zero."""
+        return (float(np.abs(self.exact).max()) if self.scale is None else self.scale) or 1.0
+
     def compared(self, outcome: Outcome) -> tuple[float, float, float]:
         """Found, exact, and relative error, where the error is greatest."""
         exact, found = (
@@ -86,10 +91,9 @@ class Known:
         )
         if exact.shape != found.shape:
             raise ValueError(f"{self.name}: found {found.shape} values for {exact.shape} exact ones")
-        scale = float(np.abs(exact).max()) if self.scale is None else self.scale
         error = np.abs(found - exact)
         at = np.unravel_index(int(np.argmax(np.where(np.isnan(error), np.inf, error))), error.shape)
-        return float(found[at]), float(exact[at]), float(error[at]) / (scale or 1.0)
+        return float(found[at]), float(exact[at]), float(error[at]) / self.size
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigsh
 
 from yarnverify.simulation.linear import Factor, LinearSolveError
 
 Array = NDArray[Any]
-SMALL = 200  # unknowns up to which all eigenvalues cost next to nothing
+SMALL = 700  # unknowns up to which a dense matrix is faster: soft directions make Lanczos vectors converge slowly
 
 
 def lowest(matrix: Any, factor: Factor, count: int) -> Array:
@@ -24,7 +25,7 @@ def lowest(matrix: Any, factor: Factor, count: int) -> Array:
     """
     n = matrix.shape[0]
     if n <= SMALL:
-        return np.linalg.eigh(matrix.toarray())[1][:, :count]
+        return np.asarray(eigh(matrix.toarray(), subset_by_index=[0, count - 1])[1])
     inverse = LinearOperator((n, n), matvec=factor.solve, dtype=float)
     start = np.random.default_rng(0).normal(size=n)
     try:  # the most negative of the inverse eigenvalues belong to the negative ones nearest to zero

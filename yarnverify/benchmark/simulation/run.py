@@ -10,13 +10,14 @@ from math import isfinite, log
 from typing import Any
 
 from yarnverify.benchmark.contestants import failure
-from yarnverify.benchmark.run import environment, pinned
+from yarnverify.benchmark.run import pinned
 from yarnverify.benchmark.simulation.cantilever import SEGMENTS, Solve, least, ours
 from yarnverify.benchmark.simulation.cloth import PARTS, SOLVERS, Cloth, copying
 from yarnverify.benchmark.simulation.memory import peak
 from yarnverify.benchmark.simulation.peers import PEERS
 from yarnverify.benchmark.timing import Clock, paired, spread
 from yarnverify.errors import InputError, NotRunError
+from yarnverify.machine import environment
 from yarnverify.simulation.linear.threads import one_thread
 
 SIZES = (100, 1_000, 10_000, 100_000)

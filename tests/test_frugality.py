@@ -1,0 +1,88 @@
+"""What scenes save by modelling only what they need: the record and its page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from yarnverify.report.pages import pages
+from yarnverify.report.simulation import frugality as spared_table
+from yarnverify.simulation import record
+from yarnverify.simulation.command import find
+from yarnverify.simulation.frugality import everything, frugality
+
+RECORDS = Path(__file__).parent.parent / "reports" / "records"
+
+
+def test_everything_adds_the_energies_and_the_sliding_that_a_scene_does_without() -> None:
+    own = find("picture_frame").problem(3)
+    full = everything(own)
+    assert [term.name for term in full.terms] == ["stretch", "shear", "bending", "parallel_contact", "gravity"]
+    assert list(full.terms[:2]) == list(own.terms) and not full.terms[4].parameters["g"].any()
+    assert set(own.fabric.slides()) <= set(np.asarray(full.active)) and set(np.asarray(own.active)) <= set(
+        np.asarray(full.active)
+    )
+    assert list(everything(own, sliding=False).active) == list(np.asarray(own.active))
+
+
+def test_costs_and_how_far_answers_move() -> None:
+    # contact alone tells the gaps; with stretch, which is stiffer, they stay near rest
+    found, timed = frugality(find("pressed_yarns").problem(6), 6)
+    own, other = found["own"], found["all energies, all sliding"]
+    assert (
+        own["energies"] == {"parallel_contact": 5}
+        and own["unknowns"] == 5
+        and own["moved"] == []
+        and not own["trouble"]
+    )
+    assert other["energies"] == {"parallel_contact": 5, "stretch": 5, "bending": 4, "shear": 0, "gravity": 5}
+    assert other["moved"][0]["name"] == "gap between neighbours" and other["moved"][0]["by"] > 0.01
+    assert timed["own"]["bytes"] < timed["all energies"]["bytes"]
+    # what a straight yarn does not need does not move it
+    found, _ = frugality(find("hanging_yarn").problem(4), 4)
+    assert max(move["by"] for move in found["all energies"]["moved"]) < 1e-12
+
+
+def test_a_scene_that_does_not_end_with_everything_is_said_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("yarnverify.simulation.frugality.LEAST", 0.0)
+    monkeypatch.setattr("yarnverify.simulation.frugality.PATIENCE", 0.0)
+    found, _ = frugality(find("catenary").problem(4), 4)
+    assert found["all energies"]["trouble"].startswith("given up") and found["all energies"]["moved"] == []
+
+
+def test_the_record_of_a_scene_and_its_page(tmp_path: Path) -> None:
+    scene = find("sliding_yarn")
+    made = record.measure([scene])
+    path = record.write(made, tmp_path)
+    assert path == tmp_path / "records" / "simulation.json"
+    again: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    (each,) = again["scenes"]
+    assert each["result"] == json.loads(
+        json.dumps(record.measure([scene])["scenes"][0]["result"])
+    )  # the same each time
+    others = {name: json.loads((RECORDS / f"{name}.json").read_text(encoding="utf-8"))
+              for name in ("verdicts", "derivations", "kernels")}  # fmt: skip
+    text = pages({**others, "simulation": again})["simulation.md"]
+    assert "| sliding_yarn | 64 segments | rest length of a segment |" in text
+    assert "| sliding_yarn, 16 segments | as it is | stretch 16 | 15 | 43 |" in text
+    assert "simulation.md" not in pages(others)
+    del each["frugality"]
+    assert spared_table(again) is None
+
+
+def test_the_committed_record_is_of_all_scenes_and_misses_no_goal() -> None:
+    from yarnverify.simulation.scenes import SCENES
+
+    committed = json.loads((RECORDS / "simulation.json").read_text(encoding="utf-8"))
+    assert [each["result"]["scene"] for each in committed["scenes"]] == [
+        scene.name for scene in SCENES if scene.validates
+    ]
+    assert [line for each in committed["scenes"] for line in each["result"]["missed"]] == []
+    for each in committed["scenes"]:
+        scene = next(scene for scene in SCENES if scene.name == each["result"]["scene"])
+        assert each["result"]["parameters"].keys() == scene.quantities.keys()
+        assert tuple(run["size"] for run in each["result"]["lines"][0]["runs"]) == scene.sizes

@@ -1,0 +1,53 @@
+"""``yarnverify simulate --write``: every scene that has a known answer, and what it would cost with everything switched on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from yarnverify.machine import environment
+from yarnverify.simulation.frugality import frugality
+from yarnverify.simulation.scene import Scene
+from yarnverify.simulation.study import Tell, study
+from yarnverify.simulation.view.files import whole
+
+COMMAND = "yarnverify simulate --write"
+ROUNDS = 2  # the shorter time of these counts: the first one meets cold memory
+
+
+def measure(scenes: Sequence[Scene], tell: Tell = lambda label, done: None) -> dict[str, Any]:
+    """The record: for each scene a ``result``, the same each time on a machine, and timings, which belong to a moment."""
+    found = [_measured(scene, (number, len(scenes)), tell) for number, scene in enumerate(scenes)]
+    return {"schema": 1, "command": COMMAND, "environment": environment(("scipy",), None), "scenes": found}
+
+
+def _measured(scene: Scene, place: tuple[int, int], tell: Tell) -> dict[str, Any]:
+    def told(label: str, done: float) -> None:
+        tell(f"{scene.name}, {label}", (place[0] + 0.5 * done) / place[1])
+
+    rounds = [study(scene, scene.sizes, {}, tell=told) for _ in range(ROUNDS)]
+    size = scene.sizes[1]
+    told(f"{size}: with everything switched on", 1.0)
+    spared, spared_timed = frugality(scene.problem(size, scene.lines()[0].values), size)
+    lines = [_shortest(same) for same in zip(*(each.timings["lines"] for each in rounds), strict=True)]
+    return {
+        "result": rounds[0].result,
+        "timings": {**rounds[0].timings, "lines": lines},
+        "frugality": {"result": spared, "timings": spared_timed},
+    }
+
+
+def _shortest(lines: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The shortest run of each size."""
+    sizes = zip(*(line["runs"] for line in lines), strict=True)
+    return {"name": lines[0]["name"], "runs": [min(runs, key=lambda run: float(run["seconds"])) for runs in sizes]}
+
+
+def write(record: dict[str, Any], folder: Path) -> Path:
+    """Write it below a folder of reports."""
+    path = folder / "records" / "simulation.json"
+    with whole(path) as part:
+        part.write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    return path
