@@ -39,6 +39,17 @@ def test_other_parameters_come_out_as_known(name: str, sizes: tuple[int, ...], v
     assert study(find(name), sizes, values).missed == []
 
 
+def test_the_diagram_draws_answers_that_one_scheme_alone_has() -> None:
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    from yarnverify.report.precision import precision
+
+    found = study(find("axial_swing"), (10, 20), {"periods": "0.2"})
+    panels = {axes.get_title(): len(axes.get_lines()) for axes in precision(found.result, found.timings).axes}
+    assert set(panels) == {"displacement", "energy"}
+    allowed = 1  # a line of its own in each panel
+    assert panels["energy"] == 1 + allowed and panels["displacement"] in (3, 3 + allowed)
+
+
 def test_energy_has_no_trend_over_many_swings() -> None:
     found = study(find("energy_over_time"), (60,), {"swings": "5", "scheme": "midpoint"})
     (answer,) = [a for a in found.result["lines"][0]["runs"][0]["answers"] if a["name"].startswith("trend")]
