@@ -12,6 +12,7 @@ from yarnverify.source import Source
 from yarnverify.symbolic.court import Court, Verdict
 from yarnverify.symbolic.declare import Declarations
 from yarnverify.symbolic.document import Section
+from yarnverify.symbolic.latex import latex
 from yarnverify.symbolic.prove import read_with
 from yarnverify.symbolic.reader import read_formula
 from yarnverify.symbolic.record import prove_source
@@ -71,10 +72,10 @@ BEND = r"\frac{2 k_b \theta}{l_1 (u_1 - u_2) \sin \theta}"
             "Bending",
             "F_x1",
             r"-\frac{2 k_b \theta}{(u_1 - u_2) \sin \theta} \mathbf{P}_1 \mathbf{d}_2",
-            "missing denominator",
+            "missing factor",
         ),
         ("Bending", "F_x1", r"-\frac{2 k_b \theta}{l_1 (u_1 - u_2) \cos \theta} \mathbf{P}_1 \mathbf{d}_2", "function"),
-        ("Bending", "F_x1", r"-\frac{2 k_b \theta}{l_1 (u_1 - u_2)} \mathbf{P}_1 \mathbf{d}_2", "missing denominator"),
+        ("Bending", "F_x1", r"-\frac{2 k_b \theta}{l_1 (u_1 - u_2)} \mathbf{P}_1 \mathbf{d}_2", "missing factor"),
         ("Bending", "F_x1", r"-\frac{2 k_b \theta}{l_1 (u_1 - u_2)^2 \sin \theta} \mathbf{P}_1 \mathbf{d}_2", "power"),
         ("Bending", "F_x1", rf"-{BEND} \mathbf{{d}}_2", "missing factor"),
         ("Bending", "F_x1", rf"-{BEND} \mathbf{{P}}_2 \mathbf{{d}}_1", MANY),
@@ -120,6 +121,44 @@ def test_a_planted_mistake_is_mended(
     assert proved(court, repair.members)
     assert repair.change.startswith(change)
     assert chain_latex(repair.members[:1]) == BLOCKS[block]  # the name of the block is left alone
+
+
+@pytest.mark.parametrize(
+    ("title", "left", "right"),
+    [
+        ("Stretch", BLOCKS["F_x1"], r"-\frac{k_s}{3} (\|\mathbf{w}_1\| - 1) \mathbf{d}_1"),
+        ("Stretch", BLOCKS["F_u1"], r"\frac{1}{2} k_s \left( \|\frac{\mathbf{w}_1}{3}\|^2 - 1 \right)"),
+        ("Stretch", BLOCKS["dF_u1/dx1"], r"\left( \frac{k_s}{\Delta u} \mathbf{w}_1^T \right)^T"),
+        ("Bending", BLOCKS["F_x1"], r"-\frac{2 k_b \theta}{(u_1 - u_2) \sin \theta} \mathbf{P}_1 \mathbf{d}_2"),
+        (
+            "Bending",
+            r"\frac{\mathbf{F}_{\mathbf{x}_0}}{3}",
+            r"-(\mathbf{F}_{\mathbf{x}_1} + \mathbf{F}_{\mathbf{x}_2})",
+        ),
+        ("Bending", r"\mathbf{F}_{\mathbf{x}_0}", r"-(\mathbf{F}_{\mathbf{x}_1} + \mathbf{F}_{\mathbf{x}_2})^T"),
+        (
+            "Bending",
+            r"\frac{\partial \mathbf{F}_{\mathbf{x}_0}}{\partial \mathbf{x}_2}",
+            r"-\left( \frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial \mathbf{x}_2}"
+            r" + \frac{\partial \mathbf{F}_{\mathbf{x}_2}}{\partial \mathbf{x}_2} \right)^T",
+        ),
+    ],
+)
+def test_what_is_mended_reads_as_it_was_meant(courts: dict[str, Court], title: str, left: str, right: str) -> None:
+    """The repair is the paper's own formula: no factor 1, no transpose of a transpose, no fraction over a fraction."""
+    repair = mend(courts[title], left, right)
+    assert repair is not None
+    meant = {
+        r"-k_s \left( \|\mathbf{w}_1\| - 1 \right) \mathbf{d}_1",
+        r"\frac{1}{2} k_s \left( \|\mathbf{w}_1\|^2 - 1 \right)",
+        r"\frac{k_s}{\Delta u} \mathbf{w}_1^T",
+        r"-\frac{2 k_b \theta}{l_1 \left( u_1 - u_2 \right) \sin \theta} \mathbf{P}_1 \mathbf{d}_2",
+        r"-\left( \mathbf{F}_{\mathbf{x}_1} + \mathbf{F}_{\mathbf{x}_2} \right)",
+        r"-\left( \frac{\partial \mathbf{F}_{\mathbf{x}_1}}{\partial \mathbf{x}_2}"
+        r" + \frac{\partial \mathbf{F}_{\mathbf{x}_2}}{\partial \mathbf{x}_2} \right)",
+    }
+    assert latex(repair.members[1]) in meant
+    assert latex(repair.members[0]) == (r"\mathbf{F}_{\mathbf{x}_0}" if "{3}" in left else left)
 
 
 @pytest.mark.parametrize(

@@ -130,6 +130,12 @@ def test_an_effect_at_rest_that_no_ball_holds_is_left_out(source: Source) -> Non
     assert claim["effect"] is None  # the root is of 0 at rest, and beside it
 
 
+def test_an_effect_at_rest_that_no_double_holds_is_left_out(source: Source) -> None:
+    record = prove_source(*edition(source, "44", "-k_c L. ", "-((10^{99})^{99})^9 k_c L. "))
+    found = [claim for claim in record["claims"] if claim["equation"] == "44"]
+    assert {(claim["verdict"], claim["effect"]) for claim in found} == {("refuted", None)}
+
+
 def alone(text: str) -> Record:
     return prove_source(Source("made.md", text), Shelf(None, "made.md", "by itself alone"))
 

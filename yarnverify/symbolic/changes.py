@@ -69,6 +69,10 @@ class Changes:
             yield cost, change, before, after, after
         for index, arg in enumerate(tree.args):
             for cost, change, before, after, new in self._changes(arg):
+                if new == ONE and (tree.op == "mul" or (tree.op == "frac" and index == 1)):
+                    continue  # nobody prints a factor 1; that it is there at all is the change
+                if tree.op == "transpose" and change == "transpose" and before is arg:
+                    continue  # nor a transpose of a transpose
                 first = tree.op == "add" and not index and change == "sign" and before is arg and arg.op != "neg"
                 cost += int(first)  # a sign between two terms is lost more easily than one before them is
                 args = (*tree.args[:index], new, *tree.args[index + 1 :])
@@ -80,9 +84,10 @@ class Changes:
             return
         yield 1, "sign", node, _negated(node)
         yield from self._symbol_changes(node)
-        if kind in (Type.VECTOR, Type.COVECTOR):
-            after = node.args[0] if node.op == "transpose" else Expr("transpose", (node,))
-            yield 1, "transpose", node, after
+        if node.op == "transpose":
+            yield 1, "transpose", node, node.args[0]
+        elif kind is not Type.SCALAR and node.op not in {"neg", "identity"}:
+            yield 1 if kind in (Type.VECTOR, Type.COVECTOR) else 3, "transpose", node, Expr("transpose", (node,))
         if node.op == "number":
             value = int(str(node.value))
             for other in sorted(
@@ -116,7 +121,7 @@ class Changes:
         if node.op == "frac":
             if kind is Type.SCALAR:
                 yield 3, "fraction upside down", node, replace(node, args=node.args[::-1])
-            yield 3, "extra denominator", node, node.args[0]
+            yield 1 if _is_number(node.args[1]) else 3, "extra denominator", node, node.args[0]
         if node.op == "add":
             for index in range(len(node.args)):
                 rest = (*node.args[:index], *node.args[index + 1 :])
@@ -153,7 +158,7 @@ class Changes:
             yield 4, "missing factor", node, _times(scalar, node)
             if node.op == "add":
                 continue
-            yield 4, "missing denominator", node, Expr("frac", (node, scalar))
+            yield 5, "missing denominator", node, Expr("frac", (node, scalar))
         if node.op == "add":
             return
         for matrix in self._matrices if kind in (Type.VECTOR, Type.COVECTOR, Type.MATRIX) else ():
@@ -212,11 +217,15 @@ class Changes:
 
 
 def block_named(member: Expr) -> str:
-    """Name of the block that a member is, up to its sign; a symbol is none, it may itself be what is wrong."""
+    """Name of the block that a member is, up to sign, transpose and numbers; a symbol is none, it may itself be wrong."""
     inner = member
-    while inner.op == "neg":
-        inner = inner.args[0]
-    return block_of(member) if inner.op in {"force", "energy", "derivative"} else ""
+    while True:
+        others = [arg for arg in inner.args if not _is_number(arg)]
+        plain = inner.op in {"neg", "transpose", "mul"} or (inner.op == "frac" and _is_number(inner.args[1]))
+        if not plain or len(others) != 1:
+            break
+        inner = others[0]
+    return block_of(inner) if inner.op in {"force", "energy", "derivative"} else ""
 
 
 def _is_angle(section: Section, name: Name) -> bool:

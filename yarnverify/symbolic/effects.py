@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 from typing import Any
 
@@ -53,8 +54,8 @@ def effect(judged: Judged) -> str | None:
                 true, printed = evaluation.value(claim.left), evaluation.value(claim.right)
             except UndefinedError:
                 continue
-            if not all(part.is_finite() for part in (*entries(true), *entries(printed))):
-                continue  # no ball holds it, for instance a root of what is zero at rest
+            if not all(math.isfinite(float(part)) for part in (*entries(true), *entries(printed))):
+                continue  # no double holds it, for instance a root of what is zero at rest, or what is huge
             flip = -1 if claim.left.op == "neg" else 1
             return _compare(claim.block, true, printed, flip, bool(aside))
     finally:
