@@ -12,6 +12,7 @@ from yarnverify.errors import InputError, NotRunError
 from yarnverify.generation import Outcome, generate_kernels, settle_files
 from yarnverify.library import declared_files, known
 from yarnverify.project import Project, project
+from yarnverify.reference import reference
 from yarnverify.show import mistake_lines, tally_lines
 from yarnverify.verdicts import nothing_printed, verdicts
 
@@ -193,8 +194,11 @@ def _records(of: Project, check: bool, advance: Callable[[str, int], None]) -> t
     elif kernels.differs:
         lines.append("The kernels differ from what the derivations give; see: yarnverify generate --check")
     proved = all(record["all_proved"] for record in derived.values() if record["measures"])
+    records = {"verdicts": found, "derivations": derived, "kernels": kernels.record}
+    if not of.own:
+        records["reference"] = reference()
     return (
-        {"verdicts": found, "derivations": derived, "kernels": kernels.record},
+        records,
         lines,
         found["as_expected"] and proved and not kernels.differs,
     )
