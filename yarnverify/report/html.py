@@ -164,7 +164,7 @@ def _speeds(record: dict[str, Any] | None, energy: str) -> list[Any]:
 _ALT = {
     "error": "Error of every variant of {} as its hard states are approached; the table below has the worst.",
     "speed": "Nanoseconds per element against worst error, for every way to compute {}; the tables below have both.",
-    "simulation-speed": "Time of a Newton iteration on cloth over the number of crossings, split into its parts; the tables have it.",
+    "simulation-speed": "Time of a Newton iteration on cloth over the number of crossings, by part; the tables have it.",
     "analysis-stability": "Lowest over largest eigenvalue of each energy's Hessian over angle and stretch: stretch is "
     "indefinite where it is compressed, bending wherever it is bent, shear off the right angle, contact never.",
     "analysis-modes": "Heights of the first four modes of a net, and errors of frequencies over the number of segments.",
