@@ -79,6 +79,16 @@ def _finish(outcome: Outcome, target: Path | None) -> None:
         sys.exit(1)
 
 
+def _named(energy: str | None, derivations: Path | None) -> tuple[str | None, Path | None]:
+    """An energy and the folder that declares it, where the name is ``FOLDER/NAME``."""
+    if energy is None or derivations is not None:
+        return energy, derivations
+    from yarnverify.project import find
+
+    place, name = find(energy)
+    return name, place.folder if place.own else None
+
+
 @contextmanager
 def progress(what: str) -> Iterator[Callable[[str, int], None]]:
     """A progress bar on standard error, if that is a terminal."""
@@ -442,6 +452,7 @@ def check(
     from yarnverify.check.setting import Options, write_states
     from yarnverify.check.show import record, show
 
+    energy, derivations = _named(energy, derivations)
     options = Options(
         energy, order, tuple(returns or ()), force, jacobian, layout, column_major, float32, with_, fix, count, regime,
         extreme, time_limit, derivations,
@@ -563,12 +574,13 @@ def export(
     Parameters
     ----------
     energy
-        Name of a declared energy, such as bending.
+        Name of a declared energy, such as bending; one of your own as FOLDER/NAME.
     """
     from yarnverify.export.command import export as run
 
+    named, derivations = _named(energy, derivations)
     with progress("exporting") as advance:
-        lines = run(energy, out, derivations, count, extreme, advance)
+        lines = run(named or energy, out, derivations, count, extreme, advance)
     print("\n".join(lines))
 
 
