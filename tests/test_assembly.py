@@ -9,7 +9,7 @@ import pytest
 
 from tests.systems import FABRICS, UNKNOWNS, moved, system, terms_of, unknowns, written_out
 from yarnverify.kernels import ElementError, bending, stretch
-from yarnverify.simulation import assembly
+from yarnverify.simulation import calls
 from yarnverify.simulation.assembly import System
 from yarnverify.simulation.fabric import bends, segments, weave, yarn
 from yarnverify.simulation.pattern import Elements, Pattern
@@ -102,7 +102,7 @@ def test_derivatives_agree_with_differences_to_second_order() -> None:
 def test_large_tables_go_by_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     cloth = weave("plain", (5, 5))
     Q, whole = moved(cloth), system(cloth).evaluate(moved(cloth))
-    monkeypatch.setattr(assembly, "CHUNK", 7)
+    monkeypatch.setattr(calls, "CHUNK", 7)
     parts = system(cloth).evaluate(Q)
     assert np.isclose(parts.energy, whole.energy, rtol=1e-14)
     assert np.allclose(parts.matrix.data, whole.matrix.data, rtol=0, atol=1e-14 * np.abs(whole.matrix.data).max())
@@ -113,7 +113,7 @@ def test_a_bad_element_is_named_by_its_place_in_the_system(monkeypatch: pytest.M
     made = System(thread.Q, terms_of(thread, obstacles=False), thread.positions())
     Q = thread.Q.copy()
     Q[thread.position(13)] = Q[thread.position(12)]
-    monkeypatch.setattr(assembly, "CHUNK", 5)
+    monkeypatch.setattr(calls, "CHUNK", 5)
     for call in (made.energy, made.evaluate, made.slope):
         with pytest.raises(ElementError, match=r"stretch: element 12: the segment x0-x1 has length zero"):
             call(Q)

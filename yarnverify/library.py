@@ -21,6 +21,7 @@ from yarnverify.errors import InputError
 MAIN_DOCUMENT = "cirio2014.md"
 _DISPLAY = re.compile(r"\$\$(.*?)\$\$", re.DOTALL)
 _SPACE = re.compile(r"\\(?:quad|qquad|thinspace)(?![A-Za-z])|\\[,;:! ]|~|\s+")
+_AT = re.compile(r" \(at line (\d+), column (\d+)\)$")
 _NUMBER = re.compile(r"(?:\\tag\{[^}]*\}|\(\d+[a-z]?\))[.,;]*$")
 _DECLARES = re.compile(r"""document\s*=\s*["']([^"']+)["']""")
 
@@ -133,15 +134,24 @@ def errata(shelf: Shelf) -> tuple[Erratum, ...]:
         if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
             raise InputError(f"{path}: errata are tables, each under a line [[erratum]]")
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: {error}") from None
+        text, at = str(error), _AT.search(str(error))
+        place = (str(path), int(at[1]), int(at[2])) if at else (str(path), 1, 1)
+        raise InputError(text[: at.start()] if at else text, place) from None
     found = []
     for number, entry in enumerate(entries, 1):
         for key in ("document", "equation", "change", "reason"):
             if not isinstance(entry.get(key), str) or not entry[key].strip():
-                raise InputError(f"{path}: erratum {number} needs a text for {key!r}")
+                told = " as yarnverify prove proposes it" if key == "change" else ""
+                raise InputError(f"erratum {number} needs a text for {key!r}{told}", _place_of(path, number))
         if entry["document"] == shelf.document:
             found.append(Erratum(entry["equation"], entry["change"], entry["reason"]))
     return tuple(found)
+
+
+def _place_of(path: Path, number: int) -> tuple[str, int, int]:
+    """File and line of an erratum, counted from 1."""
+    lines = [i for i, line in enumerate(_text(path).splitlines(), 1) if line.strip() == "[[erratum]]"]
+    return str(path), lines[number - 1] if len(lines) >= number else 1, 1
 
 
 def prints_formulas(path: Path) -> bool:

@@ -8,18 +8,16 @@ Elements go through kernel and sum a chunk at a time, in memory that is kept: no
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
-from time import perf_counter
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from yarnverify.kernels import ElementError
-from yarnverify.kernels.batch import Batch
+from yarnverify.simulation.calls import Calls
 from yarnverify.simulation.owners import owners
 from yarnverify.simulation.pattern import Elements, Pattern, zeros
 from yarnverify.simulation.problem import Evaluation, Worst
@@ -27,10 +25,9 @@ from yarnverify.simulation.scatter import Arrays, Loops, Scatter, engine_for
 from yarnverify.simulation.semidefinite import ALONE, Form, eigenvalues, form_of
 from yarnverify.simulation.terms import Term
 
-__all__ = ["CHUNK", "Evaluation", "System", "Term", "Worst"]
+__all__ = ["Evaluation", "System", "Term", "Worst"]
 
 Array = NDArray[Any]
-CHUNK = 8192
 
 
 class System:
@@ -53,10 +50,6 @@ class System:
     definite
         ``quick`` for the forms of ``semidefinite``, ``eigenvalues`` for the exact projection of every element.
 
-    Attributes
-    ----------
-    seconds
-        Time spent so far, by ``kernels`` and ``assembly``, as told by ``clock``.
     """
 
     def __init__(
@@ -89,11 +82,22 @@ class System:
         self.pattern = Pattern(self.size, self.active, [*tables, *others])
         self.scatter: Scatter = Loops() if self.engine == "compiled" else Arrays()
         self._forms: list[Form] = [form_of(t.kernel) if definite == "quick" else eigenvalues for t in self.terms]
-        self._memory: dict[tuple[int, int], list[Array]] = {}
-        self._batches: dict[tuple[int, str], tuple[Term, Batch]] = {}  # with its term, whose id is taken as long
-        self.seconds = {"kernels": 0.0, "assembly": 0.0}
-        self.clock: Callable[[], float] = perf_counter
+        self._calls = Calls(self.engine)
         self.nodes, self.coordinates = owners(np.asarray(Q, float), self.active, tables)
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Time spent so far, by ``kernels`` and ``assembly``, as told by ``clock``."""
+        return self._calls.seconds
+
+    @property
+    def clock(self) -> Callable[[], float]:
+        """What tells the time."""
+        return self._calls.clock
+
+    @clock.setter
+    def clock(self, clock: Callable[[], float]) -> None:
+        self._calls.clock = clock
 
     @property
     def count(self) -> int:
@@ -111,22 +115,22 @@ class System:
             An element has none there.
         """
         total = self._work(Q)
-        for term, _, part, q in self._chunks(Q):
-            total += float(np.add.reduce(self._run(term, "E", q, part)[0]))
+        for term, _, part, q in self._calls.chunks(self.terms, Q):
+            total += float(np.add.reduce(self._calls.run(term, "E", q, part)[0]))
         return total
 
     def energies(self, Q: Array) -> dict[str, float]:
         """Energy by the name of its term."""
         found = {term.name: 0.0 for term in self.terms}
-        for term, _, part, q in self._chunks(Q):
-            found[term.name] += float(np.add.reduce(self._run(term, "E", q, part)[0]))
+        for term, _, part, q in self._calls.chunks(self.terms, Q):
+            found[term.name] += float(np.add.reduce(self._calls.run(term, "E", q, part)[0]))
         return found
 
     def slope(self, Q: Array) -> Array:
         """Derivative of the energy in every entry of a configuration, held ones too, (size,): there it is the reaction."""
         total = np.zeros(self.size)
-        for term, _, part, q in self._chunks(Q):
-            g = self._run(term, "G", q, part)[0]
+        for term, _, part, q in self._calls.chunks(self.terms, Q):
+            g = self._calls.run(term, "G", q, part)[0]
             self.scatter.entries(total, term.table.rows[:, part], g)
         return total - self.loads
 
@@ -142,19 +146,19 @@ class System:
         """All at once."""
         total, force = self._work(Q), float(np.abs(self.loads).max(initial=0.0))
         slope, sums = np.zeros(self.size), self.pattern.zero()
-        for term, number, part, q in self._chunks(Q):
+        for term, number, part, q in self._calls.chunks(self.terms, Q):
             places = self.pattern.places[number]
             if not places.pairs.size:
-                e, g = self._run(term, "EG", q, part)
+                e, g = self._calls.run(term, "EG", q, part)
                 packed = None
             elif definite and self._forms[number] in ALONE:
-                e, g = self._run(term, "EG", q, part)
-                packed = self._output(len(term.kernel.DOFS), e.size)[2]
-                self._form(number, term, q, part, packed)
+                e, g = self._calls.run(term, "EG", q, part)
+                packed = self._calls.memory(len(term.kernel.DOFS), e.size)[2]
+                self._calls.form(self._forms[number], term, q, part, packed, places)
             else:
-                e, g, packed = self._run(term, "EGH", q, part)
+                e, g, packed = self._calls.run(term, "EGH", q, part)
                 if definite:
-                    self._form(number, term, q, part, packed)
+                    self._calls.form(self._forms[number], term, q, part, packed, places)
             start = self.clock()
             total += float(np.add.reduce(e))
             most, least = np.maximum.reduce(g, None, initial=0.0), np.minimum.reduce(g, None, initial=0.0)
@@ -180,7 +184,7 @@ class System:
             if not at.size:
                 continue
             rows = term.table.rows[:, at]
-            e, g = self._run(term, "EG", Q[rows], at, fresh=True)
+            e, g = self._calls.run(term, "EG", Q[rows], at, fresh=True)
             size = np.where(rows == entry, np.abs(g), 0).max(axis=0)
             k = int(np.argmax(size))
             if found is None or size[k] > found[0]:
@@ -212,55 +216,6 @@ class System:
         if Q.shape != (self.size,):
             raise ValueError(f"a configuration has shape ({self.size},), not {Q.shape}")
         return -float(np.add.reduce(self.loads * Q))
-
-    def _chunks(self, Q: Array) -> Iterator[tuple[Term, int, slice, Array]]:
-        for number, term in enumerate(self.terms):
-            n = term.table.count
-            for start in range(0, n, CHUNK):
-                part = slice(start, min(start + CHUNK, n))
-                rows = term.table.rows[:, part]
-                q = self._output(rows.shape[0], rows.shape[1])[3]
-                before = self.clock()
-                np.take(Q, rows, out=q, mode="clip")
-                self.seconds["assembly"] += self.clock() - before
-                yield term, number, part, q
-
-    def _output(self, dof: int, n: int) -> list[Array]:
-        """Memory for energy, gradient, packed Hessian and rows of a chunk."""
-        if (dof, n) not in self._memory:
-            shapes = [(n,), (dof, n), (dof * (dof + 1) // 2, n), (dof, n)]
-            self._memory[dof, n] = [np.empty(shape) for shape in shapes]
-        return self._memory[dof, n]
-
-    def _run(self, term: Term, wanted: str, q: Array, part: Any, fresh: bool = False) -> list[Array]:
-        start = self.clock()
-        try:
-            found = self._batch(term, wanted, q, part, fresh).again()
-        except ElementError as error:
-            at = error.elements + (part.start if isinstance(part, slice) else 0)
-            reason = str(error).partition(f"element {error.elements[0]}: ")[2]
-            raise ElementError(f"{term.name}: element {at[0]}: {reason}", at) from None
-        finally:
-            self.seconds["kernels"] += self.clock() - start
-        return found
-
-    def _batch(self, term: Term, wanted: str, q: Array, part: Any, fresh: bool) -> Batch:
-        """The call of a kernel; that of a table of one chunk is kept, since making it costs more than a few elements do."""
-        whole = not fresh and q.shape[1] == term.table.count
-        key = (id(term), wanted)
-        if whole and key in self._batches:
-            return self._batches[key][1]
-        kept = [] if fresh else [self._output(*q.shape)["EGH".index(letter)] for letter in wanted]
-        out: Any = None if fresh else kept if len(kept) > 1 else kept[0]
-        made = Batch(term.kernel.KERNEL, wanted, q, term.some(part), out=out, engine=self.engine)
-        if whole:
-            self._batches[key] = term, made
-        return made
-
-    def _form(self, number: int, term: Term, q: Array, part: slice, packed: Array) -> None:
-        start = self.clock()
-        self._forms[number](q, term.some(part), packed, self.pattern.places[number].pairs.tolist())
-        self.seconds["kernels"] += self.clock() - start
 
 
 def _indices(active: ArrayLike, size: int) -> Array:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from yarnverify.kernels.batch import Batch, upper
-from yarnverify.simulation.assembly import CHUNK, System, Term
+from yarnverify.simulation.assembly import System, Term
+from yarnverify.simulation.calls import CHUNK
 from yarnverify.simulation.pattern import Elements, zeros
 
 Array = NDArray[Any]

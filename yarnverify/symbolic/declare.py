@@ -25,6 +25,9 @@ from yarnverify.symbolic.energies import Assumption, Declarations, Energy, Motio
 from yarnverify.symbolic.formulas import (
     angle,
     arccos,
+    arcsin,
+    arctan,
+    atan2,
     cos,
     cross,
     deviation,
@@ -340,7 +343,8 @@ def unchanged_by(energy: Energy) -> Callable[[Callable[..., dict[str, Expr | int
 
 
 __all__ = [
-    "PI", "Assumption", "Declarations", "Energy", "Motion", "Parameter", "Point", "Positive", "Quantity", "Real", "Sliding",
-    "SlidingSpeed", "Vector", "Velocity", "angle", "arccos", "assumptions", "cos", "cross", "deviation", "dot", "energy", "exp",
-    "length", "load_declarations", "log", "name_of", "quantity", "sin", "sqrt", "square", "tan", "unchanged_by", "unit",
+    "PI", "Assumption", "Declarations", "Energy", "Motion", "Parameter", "Point", "Positive", "Quantity", "Real",
+    "Sliding", "SlidingSpeed", "Vector", "Velocity", "angle", "arccos", "arcsin", "arctan", "assumptions", "atan2",
+    "cos", "cross", "deviation", "dot", "energy", "exp", "length", "load_declarations", "log", "name_of", "quantity",
+    "sin", "sqrt", "square", "tan", "unchanged_by", "unit",
 ]  # fmt: skip

@@ -81,6 +81,9 @@ def dimension_of(expr: Expr, lookup: Callable[[Name], Dimension]) -> Dimension:
         case "sqrt":
             return _times(NUMBER, parts[0], Fraction(1, 2))
         case "call":
+            if expr.value == "atan2":
+                _common(expr.args, parts)  # only their ratio counts
+                return NUMBER
             if parts[0] != NUMBER:
                 raise DimensionError(f"{expr.value} of what is in {unit_text(parts[0])}")
             return NUMBER

@@ -17,6 +17,7 @@ from sympy.printing.numpy import NumPyPrinter
 
 from yarnverify.symbolic.declare import Energy
 from yarnverify.symbolic.document import Section, block_of
+from yarnverify.symbolic.plain import plain
 from yarnverify.symbolic.reading import Reading, UnsupportedError, Value, map_value
 from yarnverify.symbolic.tree import FORCE, Expr, Name
 
@@ -258,11 +259,19 @@ def zero_length(ends: Iterable[Name], more: str = "") -> str:
 
 
 def domain_checks(energy: Energy, reading: Components) -> Iterable[Check]:
-    """The declared domain, where leaving it is an error."""
+    """The declared domain, where leaving it is an error; and what logarithms are taken of."""
     if energy.elsewhere != "zero":
         for assumption in energy.domain:
             margin = reading.value(assumption.left) - reading.value(assumption.right)
             yield margin, "energy", f"{_plain(assumption.left)} > {_plain(assumption.right)} does not hold"
+    for node in dict.fromkeys(energy.expression.walk()):
+        # lengths have checks of their own
+        if node.op == "call" and node.value == "log" and not any(n.op == "norm" for n in node.walk()):
+            yield (
+                reading.value(node.args[0]),
+                "energy",
+                f"the logarithm of {plain(node.args[0])} is taken, which is not positive",
+            )
 
 
 def active(energy: Energy, reading: Components) -> Any:

@@ -40,6 +40,11 @@ def cross(a: Expr, b: Expr) -> Expr:
     return Expr("cross", (a, b))
 
 
+def atan2(y: Scalar, x: Scalar) -> Expr:
+    """Angle of the point (x, y), from -pi to pi."""
+    return Expr("call", (as_expr(y), as_expr(x)), "atan2")
+
+
 def _function(name: str, what: str) -> Callable[[Scalar], Expr]:
     def function(value: Scalar) -> Expr:
         return Expr("sqrt", (as_expr(value),)) if name == "sqrt" else Expr("call", (as_expr(value),), name)
@@ -53,6 +58,8 @@ sin = _function("sin", "Sine of an angle in radians.")
 cos = _function("cos", "Cosine of an angle in radians.")
 tan = _function("tan", "Tangent of an angle in radians.")
 arccos = _function("arccos", "Angle from 0 to pi with a given cosine.")
+arcsin = _function("arcsin", "Angle from -pi/2 to pi/2 with a given sine.")
+arctan = _function("arctan", "Angle from -pi/2 to pi/2 with a given tangent.")
 log = _function("log", "Natural logarithm of a positive scalar.")
 exp = _function("exp", "Exponential of a scalar.")
 
@@ -63,6 +70,7 @@ def deviation(a: Expr, b: Expr) -> Expr:
 
 
 FUNCTIONS = (
-    "angle", "arccos", "cos", "cross", "deviation", "dot", "exp", "length", "log", "sin", "sqrt", "square", "tan", "unit",
+    "angle", "arccos", "arcsin", "arctan", "atan2", "cos", "cross", "deviation", "dot", "exp", "length", "log", "sin",
+    "sqrt", "square", "tan", "unit",
 )  # fmt: skip
 __all__ = ["FUNCTIONS", *FUNCTIONS]

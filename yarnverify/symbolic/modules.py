@@ -11,7 +11,7 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from yarnverify.errors import NotRunError
+from yarnverify.errors import InputError, NotRunError
 from yarnverify.source import load
 from yarnverify.symbolic.angles import prove_derivatives, prove_recurrence, turning_series
 from yarnverify.symbolic.court import Court, Finding, Verdict
@@ -33,6 +33,7 @@ from yarnverify.symbolic.emit import (
 )
 from yarnverify.symbolic.invariants import prove_invariants
 from yarnverify.symbolic.measures import NoMeasuresError
+from yarnverify.symbolic.places import part_of
 from yarnverify.symbolic.prove import read_with
 from yarnverify.symbolic.reading import UnsupportedError
 from yarnverify.symbolic.repair import Workshop
@@ -178,10 +179,18 @@ def proved(energy: Energy, declarations: Declarations) -> Proved:
 
     Raises
     ------
+    InputError
+        If an invariance is declared that is not proved.
     NotRunError
-        If a derived block or a declared invariance is not proved.
+        If a derived block is not proved.
     """
-    _require_proofs(energy.name, prove_invariants(energy, declarations.motions), "")
+    for what, finding in prove_invariants(energy, declarations.motions).items():
+        if finding.verdict is not Verdict.PROVED:
+            reason = finding.reason or "it changes"
+            raise InputError(
+                f"{energy.name}: {what} is {finding.verdict}: {reason}; it is declared here",
+                part_of(energy.place, "unchanged"),
+            )
     derivation = derive_declared(energy, declarations.quantities)
     if derivation is None:
         section = declared_section(energy)

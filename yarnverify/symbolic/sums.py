@@ -26,6 +26,7 @@ from yarnverify.symbolic.emit import (
     row_symbols,
     settled,
 )
+from yarnverify.symbolic.measures import differentiate
 from yarnverify.symbolic.reading import Value
 from yarnverify.symbolic.tree import Expr
 
@@ -46,6 +47,9 @@ class _Sums(Components):
     def value(self, expr: Expr, blocks: Callable[[Expr], Value] | None = None) -> Value:
         found = super().value(expr, blocks)
         return self._steps_of(found) if expr.op in _STEPS else found
+
+    def absolute(self, value: Any) -> Any:
+        return super().absolute(self.hold(value))  # a symbol is known to be real, and so its sign to have no slope
 
     def _steps_of(self, value: Value) -> Value:
         return [self._steps_of(part) for part in value] if isinstance(value, list) else self.hold(value)
@@ -73,11 +77,11 @@ class Stages:
         """Derivative of an expression by a row, through the steps that it uses."""
         key = value, row
         if key not in self._slopes:
-            terms = [sp.diff(value, row)]
+            terms = [differentiate(value, row)]
             for symbol in sorted(value.free_symbols & set(self.steps), key=str):
                 inner = self.slope(self.steps[symbol], row)
                 if inner != 0:
-                    terms.append(sp.diff(value, symbol) * inner)
+                    terms.append(differentiate(value, symbol) * inner)
             self._slopes[key] = sp.Add(*terms)
         return self._slopes[key]
 

@@ -148,7 +148,9 @@ def as_expr(value: Expr | int | Fraction) -> Expr:
         return value
     if isinstance(value, int | Fraction) and not isinstance(value, bool):
         return number(value)
-    raise TypeError(f"{value!r} cannot stand in a formula: use integers and fractions.Fraction, which are exact")
+    raise TypeError(
+        f"{value!r} cannot stand in a formula: use integers and fractions.Fraction, which are exact, as in k / 2"
+    )
 
 
 def number(value: int | Fraction) -> Expr:
