@@ -138,6 +138,7 @@ def c_header(vectors: Vectors) -> str:
     return _TEMPLATES.get_template("golden.h.jinja").render(
         vectors=vectors,
         tags=[json.dumps(tag) for tag in vectors.tags],
+        names=[json.dumps(name) for name, _, _ in vectors.blocks],
         q=table(vectors.q),
         parameters=table(np.column_stack(given)),
         energies=table(vectors.energies),

@@ -16,7 +16,7 @@ from yarnverify.simulation.solids import Ball
 @scene(
     title="a cloth draped over a sphere",
     size="yarns of each family",
-    sizes=(48,),
+    sizes=(40,),
     wall="nowhere: the sphere carries the cloth, without friction",
     least=3,
     solvers=("direct",),
@@ -32,7 +32,7 @@ def draped_cloth(
     rho: float = positive(2e-5, "kg/m", "20 tex"),
     k: float = positive(1e4, "N m^-2", "of the sphere: a depth of 0.1 mm carries 1e-4 N, the weight of 200 crossings"),
     L: float = positive(2e-3, "m", "cheesecloth, 5 yarns a centimetre"),
-    R: float = positive(0.15e-3, "m", "20 tex, loosely twisted"),
+    R: float = positive(0.25e-3, "m", "20 tex, hardly twisted: 100 kg/m^3"),
     g: float = positive(9.81, "m/s^2", "gravity"),
     scheme: Scheme = choice("implicit_euler", "bdf2", "midpoint"),
 ) -> Moving:

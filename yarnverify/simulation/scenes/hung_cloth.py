@@ -16,7 +16,7 @@ from yarnverify.simulation.setting import Moving
 @scene(
     title="a cloth hung by two corners",
     size="yarns of each family",
-    sizes=(48,),
+    sizes=(40,),
     wall="at the crossings of two corners, nearer to each other than the edge between them is long",
     least=3,
     solvers=("direct",),
@@ -31,7 +31,7 @@ def hung_cloth(
     k_x: float = positive(5e-4, "N", "open cloth: 4 k_x/L = 1 N/m, a fifth of a light shirting"),
     rho: float = positive(2e-5, "kg/m", "20 tex"),
     L: float = positive(2e-3, "m", "cheesecloth, 5 yarns a centimetre"),
-    R: float = positive(0.15e-3, "m", "20 tex, loosely twisted"),
+    R: float = positive(0.25e-3, "m", "20 tex, hardly twisted: 100 kg/m^3"),
     g: float = positive(9.81, "m/s^2", "gravity"),
     scheme: Scheme = choice("implicit_euler", "bdf2", "midpoint"),
 ) -> Moving:
