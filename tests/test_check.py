@@ -67,6 +67,7 @@ def test_kernels_of_the_package_pass(energy: str, variant: str) -> None:
         ("bending_force_unsaid", {"returns": ("_", "force", "hessian")}),
         ("stretch_by_radius", {"given": ("R=0.25", "Y=k_s/(pi*R**2)")}),
         ("bending_without_stiffness", {"fix": ("k_b=1",)}),
+        ("bending_half", {"given": ("k_b=k_b/(0.5)",)}),
         (
             "stretch_sliding_forces",
             {"returns": ("u0", "u1"), "force": True, "regimes": ("moderate", "sliding", "ratios")},

@@ -117,7 +117,7 @@ def test_generate_refuses_an_energy_with_wrong_units(tmp_path: Path, folder: Pat
     text = (folder / "gravity.py").read_text(encoding="utf-8")
     (tmp_path / "gravity.py").write_text(text.replace('"m s^-2"', '"m s^-1"'), encoding="utf-8")
     with pytest.raises(
-        InputError, match=r"gravity.py:10:1: gravity: the energy comes out in kg m\^2 s\^-1, and J is kg m\^2 s\^-2"
+        InputError, match=r"gravity.py:12:12: gravity: the energy comes out in kg m\^2 s\^-1, and J is kg m\^2 s\^-2"
     ):
         kernel_modules(tmp_path, MAIN_DOCUMENT, "accurate")
 

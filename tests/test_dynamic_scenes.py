@@ -83,12 +83,12 @@ def ended(name: str, size: int, values: dict[str, Any]) -> tuple[Any, Outcome]:
 
 
 def test_a_hung_cloth_hangs_below_its_corners() -> None:
-    problem, end = ended("hung_cloth", 8, {"until": 0.3})
+    problem, end = ended("hung_cloth", 6, {"until": 0.2, "h": 0.01})
     cloth, start = problem.fabric, problem.fabric.points(problem.start)
     corners = [cloth.node(0, -1), cloth.node(-1, -1)]
     assert (end.points[corners] == start[corners]).all()
-    assert end.points[[cloth.node(0, 0), cloth.node(-1, 0)], 2].max() < -4 * cloth.L  # it has swung down
-    mirrored = end.points[[cloth.node(7 - i, j) for i, j in cloth.grid]]
+    assert end.points[[cloth.node(0, 0), cloth.node(-1, 0)], 2].max() < -2 * cloth.L  # it has swung down
+    mirrored = end.points[[cloth.node(5 - i, j) for i, j in cloth.grid]]
     mirrored[:, 0] = start[corners, 0].sum() - mirrored[:, 0]
     assert mirrored == pytest.approx(end.points[cloth.crossings], abs=1e-6)  # as symmetric as it began
     energy = end.recorded["energy"]
@@ -105,7 +105,7 @@ def test_a_draped_cloth_lies_on_the_sphere() -> None:
 
 
 def test_a_pulled_yarn_slides_and_the_others_stay() -> None:
-    problem, end = ended("pulled_yarn", 4, {"h": 4e-3, "pull": 5e-3})
+    problem, end = ended("pulled_yarn", 4, {"h": 5e-3, "pull": 5e-3})
     cloth = problem.fabric
     (known,) = problem.known
     assert known.compared(end)[2] < known.within
@@ -122,7 +122,7 @@ def test_a_pulled_yarn_slides_and_the_others_stay() -> None:
 
 @pytest.mark.parametrize("name", ["thrown_cloth", "pulled_yarn"])
 def test_a_run_taken_up_again_has_the_same_bits(name: str) -> None:
-    values = {"h": 4e-3, "pull": 5e-3} if name == "pulled_yarn" else {"scheme": "bdf2"}
+    values = {"h": 1e-2, "pull": 5e-3} if name == "pulled_yarn" else {"scheme": "bdf2"}
     size = 4 if name == "pulled_yarn" else 12
     states = [at.arrays() for at in Run(find(name).problem(size, values)).go()]
     *_, last = Run(find(name).problem(size, values)).go(states[5])

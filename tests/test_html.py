@@ -13,7 +13,7 @@ import pytest
 
 from tests.pages import records, simulated, whole_page
 from yarnverify.report.mathml import compared, formula
-from yarnverify.report.scenes import overview, scenes
+from yarnverify.report.scenes import scenes
 from yarnverify.report.svg import inline
 
 
@@ -89,7 +89,8 @@ def test_what_was_not_measured_says_so() -> None:
     found = {name: record for name, record in records().items() if name in ("verdicts", "derivations", "kernels")}
     missing = {"accuracy": None, "benchmark": None, "analysis": None, "simulation": None}
     text = " ".join("".join(read(whole_page(found | missing)).text).split())
-    assert text.count("Not run.") == 3  # errors, scenes and analysis
+    assert text.count("Not run.") == 2  # errors and analysis
+    assert "Not compared with known answers: not run." in text
     assert "Not run: stretch, bending, shear, parallel_contact" in text
     assert "Command: yarnverify accuracy --write" in text
 
@@ -116,20 +117,23 @@ def test_text_of_a_document_is_no_markup() -> None:
 def test_scenes_show_errors_orders_and_seconds() -> None:
     text = " ".join("".join(read(whole_page(photos={"elastica": b"PNG"})).text).split())
     assert "A hanging yarn, stretched by its own weight" in text
-    assert "Command: yarnverify simulate elastica --out results" in text
+    assert "Command: yarnverify simulate elastica --out reports/scenes/elastica" in text
     runs = scenes(simulated())[1].runs
     assert runs is not None and runs.headings[:4] == ("wall", "segments", "unknowns", "iterations")
     assert runs.headings[-1] == "seconds" and len(runs.rows) == 4
     assert float(runs.rows[1][5]) == pytest.approx(2, abs=0.2)
 
 
-def test_the_overview_takes_the_worst_of_what_is_judged() -> None:
-    record = copy.deepcopy(simulated())
-    answers = [line["runs"][-1]["answers"][0] for line in record["scenes"][0]["result"]["lines"]]
-    answers[0]["error"], answers[1]["error"] = 0.25, 1e-3
-    assert overview(record).rows[0][2] == "2.5e-1"
-    answers[0]["allowed"] = None
-    assert overview(record).rows[0][2] == "1.0e-3"
+def test_results_of_a_gallery_are_shown_without_a_record() -> None:
+    result = copy.deepcopy(simulated()["scenes"][0]["result"])
+    for line in result["lines"]:
+        for run in line["runs"]:
+            run["answers"] = []
+    text = whole_page(records() | {"simulation": None}, gallery=[result], photos={"hanging_yarn": b"PNG"})
+    assert "Command: <code>yarnverify simulate hanging_yarn --size 8 --out reports/scenes/hanging_yarn</code>" in text
+    assert 'alt="The end of the scene: a hanging yarn' in text
+    assert "Not compared with known answers: not run." in text
+    assert len(scenes(simulated(), [result])) == 2  # the record has it
 
 
 def test_a_goal_that_was_missed_is_shown() -> None:
@@ -204,7 +208,7 @@ def test_pictures_keep_their_names_apart_and_follow_the_theme() -> None:
     text = inline(one, "bending", 'error "of" <all>')
     root = fromstring(text)
     assert root.get("aria-label") == 'error "of" <all>'
-    assert root.get("style") == "max-width: 13px"
+    assert root.get("style") == "max-width: 13px; min-width: min(36rem, 13px)"
     assert 'id="bending-m1"' in text and 'href="#bending-m1"' in text and "url(#bending-m1)" in text
     assert "unused" not in text and "metadata" not in text and "<style" not in text
     assert 'd="M 1.23 2 L 3 4"' in text

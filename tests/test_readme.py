@@ -109,3 +109,24 @@ def test_a_derivation_shows_itself(declarations: Any) -> None:
     energy = next(e for e in declarations.energies if e.name == "parallel_contact")
     assert energy._repr_latex_() == r"$\displaystyle V = \frac{k_c L \left( u_1 - u_0 - d \right)^2}{2}$"
     assert energy.expression._repr_latex_() in energy._repr_latex_().replace("V = ", "")
+
+
+# -- the reference page -----------------------------------------------------------------------------------------------
+
+
+def test_the_reference_holds_what_can_be_imported() -> None:
+    import importlib
+
+    from yarnverify.reference import reference
+
+    found = reference()["modules"]
+    assert len(found) >= 9
+    for module in found:
+        there = importlib.import_module(module["name"])
+        assert module["entries"], module["name"]
+        for entry in module["entries"]:
+            assert hasattr(there, entry["name"]), (module["name"], entry["name"])
+    page = (Path(__file__).parent.parent / "reports" / "reference.md").read_text(encoding="utf-8")
+    assert "### barrier" not in page and "### energy\n" in page and "Raises\n------" in page
+    anchors = {re.sub(r"[^\w\- ]", "", line[3:]).lower() for line in page.splitlines() if line.startswith("## ")}
+    assert set(re.findall(r"\]\(#([^)]+)\)", page)) <= anchors

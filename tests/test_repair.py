@@ -130,6 +130,7 @@ def test_a_planted_mistake_is_mended(
         ("Stretch", BLOCKS["F_u1"], r"\frac{1}{2} k_s \left( \|\frac{\mathbf{w}_1}{3}\|^2 - 1 \right)"),
         ("Stretch", BLOCKS["dF_u1/dx1"], r"\left( \frac{k_s}{\Delta u} \mathbf{w}_1^T \right)^T"),
         ("Bending", BLOCKS["F_x1"], r"-\frac{2 k_b \theta}{(u_1 - u_2) \sin \theta} \mathbf{P}_1 \mathbf{d}_2"),
+        ("Parallel Contact", BLOCKS["F_u0"], r"(-k_c) L (\Delta u - d)"),
         (
             "Bending",
             r"\frac{\mathbf{F}_{\mathbf{x}_0}}{3}",
@@ -149,6 +150,7 @@ def test_what_is_mended_reads_as_it_was_meant(courts: dict[str, Court], title: s
     repair = mend(courts[title], left, right)
     assert repair is not None
     meant = {
+        r"k_c L \left( \Delta u - d \right)",
         r"-k_s \left( \|\mathbf{w}_1\| - 1 \right) \mathbf{d}_1",
         r"\frac{1}{2} k_s \left( \|\mathbf{w}_1\|^2 - 1 \right)",
         r"\frac{k_s}{\Delta u} \mathbf{w}_1^T",

@@ -449,8 +449,11 @@ def check(
     if write_inputs is not None:
         print(write_states(write_inputs, options))
         return
-    with progress("checking") as advance:
-        found = checked(target, options, command, outputs, files, advance)
+    try:
+        with progress("checking") as advance:
+            found = checked(target, options, command, outputs, files, advance)
+    except KeyboardInterrupt:
+        _stop("interrupted; nothing was judged", 3)
     if not _json(record(found), json_file):
         show(found)
     if not found.passes:

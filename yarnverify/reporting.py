@@ -12,6 +12,7 @@ from yarnverify.errors import InputError, NotRunError
 from yarnverify.generation import Outcome, generate_kernels, settle_files
 from yarnverify.library import declared_files, known
 from yarnverify.project import Project, project
+from yarnverify.reference import reference
 from yarnverify.show import mistake_lines, tally_lines
 from yarnverify.verdicts import nothing_printed, verdicts
 
@@ -76,7 +77,7 @@ def build_report(
     there = {path.relative_to(out).as_posix() for pattern in ("*.md", "records/*.json") for path in out.glob(pattern)}
     there -= {f"records/{name}.json" for name in MEASURED}
     if not check:  # made from the same records at any time, and so not kept under version control
-        texts["report.html"] = _page(records | measured, out / "pictures", of.name)
+        texts["report.html"] = _page(records | measured, out, of.name)
     outcome = settle_files(out, texts, check, sorted(there - set(texts)), of.command("yarnverify report"))
     outcome.lines = [*lines, *outcome.lines]
     outcome.record = {
@@ -90,15 +91,23 @@ def build_report(
     return outcome
 
 
-def _page(records: dict[str, Any], folder: Path, name: str) -> str:
-    """The HTML report, with the pictures that are in a folder and the scenes that are drawn there."""
+def _page(records: dict[str, Any], out: Path, name: str) -> str:
+    """The HTML report, with the pictures that are there, and the scenes that ``simulate --out`` left in ``scenes/``."""
     from yarnverify.report.html import page
 
-    svg, html = ({path.stem: path.read_text(encoding="utf-8") for path in sorted(folder.glob(f"*.{suffix}"))}
-                 for suffix in ("svg", "html"))  # fmt: skip
-    names = [each["result"]["scene"] for each in (records.get("simulation") or {"scenes": []})["scenes"]]
-    photos = {scene: path.read_bytes() for scene in names if (path := folder / f"{scene}.png").is_file()}
-    return page(records, svg, name, photos=photos, turned=html)
+    svg = {path.stem: path.read_text(encoding="utf-8") for path in sorted((out / "pictures").glob("*.svg"))}
+    photos, turned, gallery = {}, {}, []
+    for path in sorted((out / "scenes").glob("*/result.json")):
+        try:
+            gallery.append(json.loads(path.read_text(encoding="utf-8")))
+            scene = gallery[-1]["scene"]
+        except (ValueError, KeyError, TypeError) as error:
+            raise InputError(f"{path}: is not a result of yarnverify simulate --out: {error}") from None
+        if (photo := path.with_name(f"{scene}.png")).is_file():
+            photos[scene] = photo.read_bytes()
+        if (whole := path.with_name(f"{scene}.html")).is_file():
+            turned[scene] = whole.read_text(encoding="utf-8")
+    return page(records, svg, name, gallery=gallery, photos=photos, turned=turned)
 
 
 def _draw(folder: Path, measured: dict[str, Any], energies: list[str], lines: list[str]) -> None:
@@ -193,8 +202,11 @@ def _records(of: Project, check: bool, advance: Callable[[str, int], None]) -> t
     elif kernels.differs:
         lines.append("The kernels differ from what the derivations give; see: yarnverify generate --check")
     proved = all(record["all_proved"] for record in derived.values() if record["measures"])
+    records = {"verdicts": found, "derivations": derived, "kernels": kernels.record}
+    if not of.own:
+        records["reference"] = reference()
     return (
-        {"verdicts": found, "derivations": derived, "kernels": kernels.record},
+        records,
         lines,
         found["as_expected"] and proved and not kernels.differs,
     )

@@ -23,6 +23,7 @@ from yarnverify.errors import InputError, NotRunError
 
 Array = NDArray[Any]
 MOST_ENDED = 3  # states that end the process, after which the rest is left
+_FIRST = 6  # times the limit: the first call may compile something
 _STARTS_WITHIN = 120.0  # seconds: what a large library may take to import
 
 
@@ -142,6 +143,8 @@ def _watched(
                 advance("calling", total)
             shown = max(shown, done)
             allowed = limit if np.any(np.asarray(status) == BEGUN) else _STARTS_WITHIN
+            if not (folder / "decided.json").exists():
+                allowed = max(limit * _FIRST, allowed)
             if time.monotonic() - since > allowed:
                 return f"does not come back within {allowed:g} s"
     finally:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from base64 import b64encode
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,8 @@ from yarnverify.report.analysis import analysis_tables, fabric_line
 from yarnverify.report.benchmark import tables, where
 from yarnverify.report.mathml import compared, formula
 from yarnverify.report.pages import mistakes
-from yarnverify.report.scenes import overview, scenes
-from yarnverify.report.simulation import frugality
+from yarnverify.report.scenes import scenes
+from yarnverify.report.simulation import frugality, summary
 from yarnverify.report.svg import inline
 
 _FOLDER = Path(__file__).parent
@@ -40,6 +40,7 @@ def page(
     pictures: Mapping[str, str],
     name: str = "",
     *,
+    gallery: Sequence[Mapping[str, Any]] = (),
     photos: Mapping[str, bytes] | None = None,
     turned: Mapping[str, str] | None = None,
 ) -> str:
@@ -53,6 +54,8 @@ def page(
         Name without suffix to SVG text, of those that were drawn.
     name
         What the command line calls the folder that it is about; empty for the one that comes with the package.
+    gallery
+        Results of scenes as ``yarnverify simulate --out`` writes them, shown where the record of simulations lacks them.
     photos, turned
         Name of a scene to its picture as PNG, and to the page that shows it in three dimensions.
     """
@@ -86,8 +89,8 @@ def page(
         fabric=fabric_line(analysis) if analysis else "",
         benchmark=records.get("benchmark"),
         simulation=simulation,
-        scenes=scenes(simulation),
-        overview=overview(simulation) if simulation else None,
+        scenes=scenes(simulation, gallery),
+        overview=summary(simulation) if simulation else None,
         frugal=frugality(simulation) if simulation else None,
         photos={scene: b64encode(data).decode() for scene, data in (photos or {}).items()},
         turned=turned or {},
@@ -99,8 +102,9 @@ def page(
 
 
 def _powers(text: str) -> Markup:
-    """Powers such as 2^-53 and N m^2 in raised figures."""
-    return Markup(re.sub(r"(?<=[\w)])\^(-?\d+)", lambda m: f"<sup>{m[1].replace('-', '−')}</sup>", str(escape(text))))
+    """Powers such as 2^-53 and N m^2 in raised figures, *words* in italics."""
+    text = re.sub(r"(?<=[\w)])\^(-?\d+)", lambda m: f"<sup>{m[1].replace('-', '−')}</sup>", str(escape(text)))
+    return Markup(re.sub(r"(?<!\S)\*(\w+)\*", r"<em>\1</em>", text))
 
 
 def _worst(verdicts: list[str]) -> str:

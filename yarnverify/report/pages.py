@@ -102,6 +102,8 @@ def pages(
             command=speed["command"],
             pictures=pictures,
         )
+    if "reference" in records:
+        texts["reference.md"] = _render("reference.md.jinja", modules=records["reference"]["modules"])
     return dict(sorted(texts.items()))
 
 

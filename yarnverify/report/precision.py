@@ -44,7 +44,8 @@ def precision(result: Mapping[str, Any], timings: Mapping[str, Any]) -> Figure:
     panels[0].set_ylabel("relative error")
     handles, labels = max((axes.get_legend_handles_labels() for axes in panels), key=lambda shown: len(shown[1]))
     figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)), frameon=False)
-    figure.supxlabel(f"seconds of processor time; numbers beside the marks are {result['size']}", fontsize=8)
+    room = "\n" if len(answers) == 1 else " "
+    figure.supxlabel(f"seconds of processor time;{room}numbers beside the marks are {result['size']}", fontsize=8)
     return figure
 
 

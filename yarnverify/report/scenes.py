@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,8 @@ class Shown:
 
     Attributes
     ----------
+    size
+        What its size counts, and the largest that was run.
     missed
         Goals that were missed, a line each.
     parameters
@@ -27,39 +29,18 @@ class Shown:
     title: str
     source: str
     wall: str
+    size: tuple[str, int]
     missed: tuple[str, ...]
     parameters: Table
     runs: Table | None
 
 
-def scenes(record: Mapping[str, Any] | None) -> list[Shown]:
-    """The scenes of a record, in its order; none where the record is missing."""
-    return [] if record is None else [_shown(each["result"], each.get("timings")) for each in record["scenes"]]
-
-
-def overview(record: Mapping[str, Any]) -> Table:
-    """A row for each answer of each scene: worst error at the largest size, order, and whether that is what it should be."""
-    rows = []
-    for each in record["scenes"]:
-        result = each["result"]
-        last = [line["runs"][-1] for line in result["lines"]]
-        for name in _names(result):
-            answers = [answer for run in last for answer in run["answers"] if answer["name"] == name]
-            answers = [one for one in answers if one["allowed"] is not None] or answers  # ways that are to be judged
-            worst = max(answers, key=lambda one: _size(one["error"]))
-            orders = [one["order"] for one in answers if one["order"] is not None and one["expected order"] is not None]
-            order = f"{min(orders):.2f}" if orders else "exact" if worst["expected order"] is None else "–"
-            rows.append(
-                (
-                    result["scene"].replace("_", " "),
-                    name,
-                    _error(worst["error"]),
-                    order,
-                    _error(worst["allowed"]),
-                )
-            )
-    headings = ("scene", "answer", "relative error", "order", "allowed")
-    return Table("Worst of all ways at the largest size", headings, tuple(rows))
+def scenes(record: Mapping[str, Any] | None, gallery: Sequence[Mapping[str, Any]] = ()) -> list[Shown]:
+    """The scenes of a record, in its order, then those results of a gallery that it lacks."""
+    recorded = [] if record is None else record["scenes"]
+    known = {each["result"]["scene"] for each in recorded}
+    found = [_shown(each["result"], each.get("timings")) for each in recorded]
+    return [*found, *(_shown(result, None) for result in gallery if result["scene"] not in known)]
 
 
 def _shown(result: Mapping[str, Any], timings: Mapping[str, Any] | None) -> Shown:
@@ -72,6 +53,7 @@ def _shown(result: Mapping[str, Any], timings: Mapping[str, Any] | None) -> Show
         result["title"],
         result["source"],
         result["wall"],
+        (result["size"], result["lines"][0]["runs"][-1]["size"]),
         tuple(result.get("missed", ())),
         Table("Parameters", ("parameter", "value", "reason or source"), parameters),
         _runs(result, timings) if result["lines"][0]["runs"][0]["answers"] else None,
@@ -102,10 +84,6 @@ def _runs(result: Mapping[str, Any], timings: Mapping[str, Any] | None) -> Table
 def _names(result: Mapping[str, Any]) -> list[str]:
     """Answers of a scene, in the order in which its ways have them."""
     return list(dict.fromkeys(answer["name"] for line in result["lines"] for answer in line["runs"][0]["answers"]))
-
-
-def _size(error: float | None) -> float:
-    return float("inf") if error is None else float(error)
 
 
 def _error(value: float | None) -> str:

@@ -43,7 +43,8 @@ def inline(text: str, name: str, alt: str) -> str:
     wide, unit = re.fullmatch(r"([\d.]+)(\w*)", root.attrib.pop("width")).groups()  # type: ignore[union-attr]
     root.attrib.pop("height")
     root.attrib = {"class": "plot", "role": "img", "aria-label": alt, "viewBox": root.attrib["viewBox"]}
-    root.set("style", f"max-width: {float(wide) * _POINT[unit]:.0f}px")
+    pixels = f"{float(wide) * _POINT[unit]:.0f}px"
+    root.set("style", f"max-width: {pixels}; min-width: min(36rem, {pixels})")  # smaller than that it cannot be read
     return tostring(root, encoding="unicode")
 
 

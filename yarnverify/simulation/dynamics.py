@@ -164,7 +164,7 @@ class Dynamics:
             force = found.slope - self.system.slope(q)
             potential = self.system.energy(q)
         except (NotConverged, ElementError, LinearSolveError) as error:
-            reason = f"the step of {h:.6g} s from time {motion.time:.6g} s has no end: "
+            reason = f"the step of {h:.6g} s from time {motion.time:.6g} s has no end, a shorter one may have: "
             if isinstance(error, NotConverged):
                 raise NotConverged(reason + error.reason, error.Q, error.history, error.worst) from error
             raise NotConverged(reason + str(error), motion.Q, [], None) from error

@@ -22,6 +22,11 @@ class Candidate:
     after: Expr
     members: tuple[Expr, ...]
 
+    @property
+    def adds_sign(self) -> bool:
+        """Whether a minus is put in, and none taken away: of two such changes the other one reads better."""
+        return self.change == "sign" and self.after.op == "neg"
+
 
 class Changes:
     """The changes of one chain.

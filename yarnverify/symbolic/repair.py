@@ -63,7 +63,7 @@ class Workshop:
         """The cheapest change that is proved, or None."""
         changes = Changes(self.section, self.court.names, self.members, self.fixed)
         seen: set[tuple[Expr, ...]] = {self.members}
-        for candidate in sorted(changes.candidates(), key=lambda c: c.cost):
+        for candidate in sorted(changes.candidates(), key=lambda c: (c.cost, c.adds_sign)):
             if candidate.members in seen:
                 continue
             seen.add(candidate.members)
