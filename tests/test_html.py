@@ -87,9 +87,9 @@ def test_every_verdict_of_the_record_is_shown(text: str) -> None:
 
 def test_what_was_not_measured_says_so() -> None:
     found = {name: record for name, record in records().items() if name in ("verdicts", "derivations", "kernels")}
-    missing = {"accuracy": None, "benchmark": None, "analysis": None, "simulation": None}
+    missing = {"accuracy": None, "benchmark": None, "analysis": None, "simulation": None, "simulation-speed": None}
     text = " ".join("".join(read(whole_page(found | missing)).text).split())
-    assert text.count("Not run.") == 2  # errors and analysis
+    assert text.count("Not run.") == 3  # errors, speed of the simulation, and analysis
     assert "Not compared with known answers: not run." in text
     assert "Not run: stretch, bending, shear, parallel_contact" in text
     assert "Command: yarnverify accuracy --write" in text

@@ -18,6 +18,7 @@ from yarnverify.report.mathml import compared, formula
 from yarnverify.report.pages import mistakes
 from yarnverify.report.scenes import scenes
 from yarnverify.report.simulation import frugality, summary
+from yarnverify.report.simulation_speed import speed_tables
 from yarnverify.report.svg import inline
 
 _FOLDER = Path(__file__).parent
@@ -61,6 +62,7 @@ def page(
     """
     found, derived = records["verdicts"], records["derivations"]
     analysis, simulation = records.get("analysis"), records.get("simulation")
+    speed = records.get("simulation-speed")
     absent = ("scenes", "analysis") * bool(name) + ("verdicts", "corrections", "equations") * (not found["document"])
     templates = Environment(
         loader=FileSystemLoader(_FOLDER / "templates" / "page"),
@@ -89,6 +91,9 @@ def page(
         fabric=fabric_line(analysis) if analysis else "",
         benchmark=records.get("benchmark"),
         simulation=simulation,
+        simulation_speed=speed,
+        simulation_tables=speed_tables(speed) if speed else [],
+        simulation_pictures=[name for name in sorted(pictures) if name.startswith("simulation")],
         scenes=scenes(simulation, gallery),
         overview=summary(simulation) if simulation else None,
         frugal=frugality(simulation) if simulation else None,
@@ -159,6 +164,7 @@ def _speeds(record: dict[str, Any] | None, energy: str) -> list[Any]:
 _ALT = {
     "error": "Error of every variant of {} as its hard states are approached; the table below has the worst.",
     "speed": "Nanoseconds per element against worst error, for every way to compute {}; the tables below have both.",
+    "simulation-speed": "Time of a Newton iteration on cloth over the number of crossings, by part; the tables have it.",
     "analysis-stability": "Lowest over largest eigenvalue of each energy's Hessian over angle and stretch: stretch is "
     "indefinite where it is compressed, bending wherever it is bent, shear off the right angle, contact never.",
     "analysis-modes": "Heights of the first four modes of a net, and errors of frequencies over the number of segments.",
