@@ -39,7 +39,8 @@ def test_costs_and_how_far_answers_move() -> None:
         and own["moved"] == []
         and not own["trouble"]
     )
-    assert other["energies"] == {"parallel_contact": 5, "stretch": 5, "bending": 4, "shear": 0, "gravity": 5}
+    # 6 wefts of three nodes each and a warp of 8, with a quadrant towards each tail at each crossing
+    assert other["energies"] == {"parallel_contact": 5, "stretch": 19, "bending": 12, "shear": 24, "gravity": 19}
     assert other["moved"][0]["name"] == "gap between neighbours" and other["moved"][0]["by"] > 0.01
     assert timed["own"]["bytes"] < timed["all energies"]["bytes"]
     # what a straight yarn does not need does not move it

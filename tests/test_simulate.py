@@ -122,6 +122,14 @@ def test_pictures(tmp_path: Path) -> None:
         assert (tmp_path / name).stat().st_size > 1000 and name in lines[-1]
 
 
+def test_the_scene_of_the_readme_comes_out_as_known(tmp_path: Path) -> None:
+    readme = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+    path = tmp_path / "my_scene.py"
+    path.write_text(readme.split("<!-- my_scene.py -->\n```\n")[1].split("```")[0], encoding="utf-8")
+    found, _ = run(str(path), given=("force=2.5 N",))
+    assert found.missed == [] and found.result["lines"][0]["runs"][0]["answers"][0]["exact"] == pytest.approx(0.105)
+
+
 # -- runs that are interrupted ----------------------------------------------------------------------------------------
 
 

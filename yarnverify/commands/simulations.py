@@ -51,7 +51,7 @@ def simulate(
         return
     with time_left() as tell:
         if scene is None:
-            path, missed = record_all(out or Path("reports"), tell)
+            path, missed = record_all(out or Path("reports"), pictures, tell)
             print("\n".join([*missed, f"{path}: written"]))
             sys.exit(1 if missed else 0)
         found, lines = run(scene, size or (), settings or (), solver, out, resume, every, pictures, tell)

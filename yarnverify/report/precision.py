@@ -43,6 +43,7 @@ def precision(result: Mapping[str, Any], timings: Mapping[str, Any]) -> Figure:
         _dress(axes, result, answer)
     panels[0].set_ylabel("relative error")
     handles, labels = max((axes.get_legend_handles_labels() for axes in panels), key=lambda shown: len(shown[1]))
+    labels = [f"{result['compared']}: {label}" for label in labels]
     figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)), frameon=False)
     room = "\n" if len(answers) == 1 else " "
     figure.supxlabel(f"seconds of processor time;{room}numbers beside the marks are {result['size']}", fontsize=8)
@@ -78,7 +79,8 @@ def _dress(axes: Axes, result: Mapping[str, Any], answer: str) -> None:
     axes.set_yscale("log")
     axes.margins(x=0.12)
     runs = [found for line in result["lines"] for found in _errors(line).get(answer, [])]
-    known = [found["allowed"] for found in runs if found["allowed"] is not None]
+    first = next(line for line in result["lines"] if answer in _errors(line))
+    known = [found["allowed"] for found in _errors(first)[answer] if found["allowed"] is not None]
     if known:
         axes.axhline(max(known), color="0.4", linewidth=0.7, linestyle=(0, (1, 3)))
         axes.annotate("allowed", (1, max(known)), xycoords=("axes fraction", "data"), xytext=(-2, 2),
@@ -87,8 +89,10 @@ def _dress(axes: Axes, result: Mapping[str, Any], answer: str) -> None:
     axes.set_ylim(min(heights) / 4, max(heights) * 6)
     axes.yaxis.set_major_locator(LogLocator(numticks=8))
     axes.yaxis.set_minor_formatter(NullFormatter())
-    seconds = axes.get_xlim()
-    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if seconds[1] < 50 * seconds[0] else (1,)))
+    low, high = axes.get_xlim()
+    wider = max(1.0, (12 * low / high) ** 0.5)  # a decade at least, so that what takes about as long looks so
+    axes.set_xlim(low / wider, high * wider)
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 50 * low else (1,)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, at: f"{value:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.grid(True, which="major", color="0.92", linewidth=0.5)

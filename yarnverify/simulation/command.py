@@ -93,12 +93,28 @@ def listing() -> list[str]:
     return [f"{scene.name:<{width}}  {scene.title}" for scene in SCENES]
 
 
-def record_all(folder: Path, tell: Tell) -> tuple[Path, list[str]]:
-    """Run every scene that has a known answer and write the record below a folder of reports; goals that were missed."""
+def record_all(folder: Path, pictures: bool, tell: Tell) -> tuple[Path, list[str]]:
+    """Run every scene that has a known answer and write the record below a folder of reports; goals that were missed.
+
+    Parameters
+    ----------
+    pictures
+        Whether to draw the end of each into ``pictures/``, where that can be done.
+    """
     from yarnverify.simulation.record import measure, write
     from yarnverify.simulation.scenes import SCENES
 
-    record = measure([scene for scene in SCENES if scene.validates], tell)
+    def draw(found: Study) -> None:
+        from yarnverify.simulation.view import picture
+
+        problem, path = found.problem, folder / "pictures" / f"{found.result['scene']}.png"
+        title, size = found.result["title"], (960, 720)
+        picture(
+            problem.fabric, found.arrays["Q"], path, colour=problem.colour, view=problem.view, title=title, size=size
+        )
+
+    drawn = {"draw": draw} if pictures and importlib.util.find_spec("matplotlib") else {}
+    record = measure([scene for scene in SCENES if scene.validates], tell, **drawn)
     return write(record, folder), [line for each in record["scenes"] for line in each["result"]["missed"]]
 
 

@@ -3,31 +3,40 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from yarnverify.machine import environment
 from yarnverify.simulation.frugality import frugality
 from yarnverify.simulation.scene import Scene
-from yarnverify.simulation.study import Tell, study
+from yarnverify.simulation.study import Study, Tell, study
 from yarnverify.simulation.view.files import whole
 
 COMMAND = "yarnverify simulate --write"
 ROUNDS = 2  # the shorter time of these counts: the first one meets cold memory
 
 
-def measure(scenes: Sequence[Scene], tell: Tell = lambda label, done: None) -> dict[str, Any]:
-    """The record: for each scene a ``result``, the same each time on a machine, and timings, which belong to a moment."""
-    found = [_measured(scene, (number, len(scenes)), tell) for number, scene in enumerate(scenes)]
+def measure(
+    scenes: Sequence[Scene], tell: Tell = lambda label, done: None, draw: Callable[[Study], None] = lambda found: None
+) -> dict[str, Any]:
+    """The record: for each scene a ``result``, the same each time on a machine, and timings, which belong to a moment.
+
+    Parameters
+    ----------
+    draw
+        Called with each study, to make a picture of it.
+    """
+    found = [_measured(scene, (number, len(scenes)), tell, draw) for number, scene in enumerate(scenes)]
     return {"schema": 1, "command": COMMAND, "environment": environment(("scipy",), None), "scenes": found}
 
 
-def _measured(scene: Scene, place: tuple[int, int], tell: Tell) -> dict[str, Any]:
+def _measured(scene: Scene, place: tuple[int, int], tell: Tell, draw: Callable[[Study], None]) -> dict[str, Any]:
     def told(label: str, done: float) -> None:
         tell(f"{scene.name}, {label}", (place[0] + 0.5 * done) / place[1])
 
     rounds = [study(scene, scene.sizes, {}, tell=told) for _ in range(ROUNDS)]
+    draw(rounds[0])
     size = scene.sizes[1]
     told(f"{size}: with everything switched on", 1.0)
     spared, spared_timed = frugality(scene.problem(size, scene.lines()[0].values), size)

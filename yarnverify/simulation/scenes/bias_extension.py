@@ -28,9 +28,7 @@ def bias_extension(
     width: float = positive(0.02, "m"),
     ratio: int = whole(2, "length over width; the zones are uniform at 2, and on the average beyond", least=2),
     strain: float = positive(0.15, "", "extension over length less width"),
-    k_x: float = positive(
-        0.01, "N", "shear modulus 4 k_x/L = 40 N/m at L = 1 mm, as cotton cloth has by Kawabata's test"
-    ),
+    k_x: float = positive(0.01, "N", "4 k_x/L = 40 N/m at L = 1 mm, as cotton cloth has by Kawabata's test"),
     k_s: float = positive(1e5, "N", "so that yarns hardly stretch; cotton yarn has some 50 N"),
     R: float = positive(0.1e-3, "m", "a fine cotton yarn"),
 ) -> Static:
@@ -76,4 +74,4 @@ def bias_extension(
     active = fabric.positions(np.flatnonzero((row > 0) & (row < 2 * along)), "xy")
     count = math.ceil(delta / L)  # so that the grip moves by no more than a cell
     stages = [Stage(held=pulled(k / count)) for k in range(1, count + 1)]
-    return Static(fabric, terms, active, known, stages, colour="shear", view="top")
+    return Static(fabric, terms, active, known, stages, colour="shear", view=((0, 0, 1), (1, 1, 0)))

@@ -26,9 +26,7 @@ def picture_frame(
     size: int,
     side: float = positive(0.05, "m", "length of a bar"),
     delta: float = real(0.015, "m", "how far the corners are pulled apart"),
-    k_x: float = positive(
-        0.01, "N", "shear modulus 4 k_x/L = 40 N/m at L = 1 mm, as cotton cloth has by Kawabata's test"
-    ),
+    k_x: float = positive(0.01, "N", "4 k_x/L = 40 N/m at L = 1 mm, as cotton cloth has by Kawabata's test"),
     k_s: float = positive(50.0, "N", "Y pi R^2 of a cotton yarn, Y = 0.4 GPa, R = 0.2 mm"),
     R: float = positive(0.2e-3, "m", "a cotton yarn"),
 ) -> Static:
@@ -55,13 +53,8 @@ def picture_frame(
 
     count = math.ceil(abs(gamma) * size) or 1  # so that the bars move by less than a cell
     known = [
-        Known(
-            "shear angle of a quadrant",
-            "rad",
-            np.full(table.count, abs(gamma)),
-            lambda end: abs(deviations(end.Q, table)),
-        ),
+        Known("shear angle of a quadrant", "rad", np.full(table.count, abs(gamma)), lambda end: abs(deviations(end.Q, table))),
         Known("pulling force", "N", force, pull, within=rounding(size**2 * k_s / abs(force or k_s))),
-    ]
+    ]  # fmt: skip
     stages = [Stage(held=sheared(gamma * k / count)) for k in range(1, count + 1)]
-    return Static(fabric, terms, active, known, stages, colour="shear", view="top")
+    return Static(fabric, terms, active, known, stages, colour="shear", view=((0, 0, 1), (1, 1, 0)))

@@ -27,9 +27,9 @@ def pressed_yarns(
     L: float = positive(0.9e-3, "m", "a dense cloth"),
     R: float = positive(0.2e-3, "m", "a cotton yarn"),
 ) -> Static:
-    fabric = weave("twill 2/2", (1, size), L, R, pressed=True)
+    fabric = weave("twill 2/2", (1, size), L, R, tails=2 * L, pressed=True)
     table = contacts(fabric)
-    along = fabric.yarns[0].slides
+    along = fabric.yarns[0].slides[1:-1]  # at the crossings
     d = table.parameters["d"]
     exact = np.array([contact_gap(force, k_c=k_c, L=L, d=float(each)) for each in d])
     if not exact.min() > 0:
@@ -37,7 +37,7 @@ def pressed_yarns(
     loads = 0 * fabric.Q
     loads[along[-1]] = -force
     start = fabric.Q.copy()
-    start[along] = np.concatenate([[0.0], np.cumsum(0.95 * d)])  # in touch, so that there is a stiffness to begin with
+    start[along[1:]] = start[along[0]] + np.cumsum(0.95 * d)  # in touch, so that there is a stiffness to begin with
     known = [Known("gap between neighbours", "m", exact, lambda end: np.diff(end.Q[along]))]
     terms = [Term(parallel_contact, table, {"k_c": k_c})]
     return Static(fabric, terms, along[1:], known, [Stage(loads)], start=start, colour="contact", view="top")

@@ -44,22 +44,10 @@ def sliding_yarn(
     lengths = np.linalg.norm(edges(start, table), axis=0)
     known = [
         Known("rest length of a segment", "m", length * lengths / lengths.sum(), lambda end: rests(end.Q, table)),
-        Known(
-            "tension of a segment",
-            "N",
-            np.full(size, k_s * strain),
-            lambda end: tensions(end.Q, table, k_s),
-            within=rounding(size * uneven * (1 + 1 / strain)),
-        ),
+        Known("tension of a segment", "N", np.full(size, k_s * strain), lambda end: tensions(end.Q, table, k_s),
+              within=rounding(size * uneven * (1 + 1 / strain))),
         Known("sum of rest lengths", "m", length, lambda end: rests(end.Q, table).sum()),
         Known("cost of sliding as a whole", "", 0.0, moved),
-    ]
-    return Static(
-        fabric,
-        [Term(stretch, table, {"k_s": k_s})],
-        fabric.slides(),
-        known,
-        start=start,
-        colour="stretch",
-        view="front",
-    )
+    ]  # fmt: skip
+    terms = [Term(stretch, table, {"k_s": k_s})]
+    return Static(fabric, terms, fabric.slides(), known, start=start, colour="stretch", view="front")
