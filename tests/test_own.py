@@ -237,6 +237,16 @@ def test_plain_differentiation_says_so_in_its_derivation(kinds: Path, run: Any) 
     assert status == 0 and "ln" not in out and "log (l1 / h)" in out and "Proved exactly" in out
 
 
+def test_code_is_checked_against_an_energy_of_ones_own(started: Path, run: Any) -> None:
+    code = "def spring(x0, x1, k, L):\n    d = x1 - x0\n    l = (d @ d) ** 0.5\n    return {} * k * (l - L) / l * d\n"
+    for sign, status in (("-1", 0), ("1", 1)):
+        (started.parent / "mine.py").write_text(code.format(sign), encoding="utf-8")
+        arguments = ("mine.py", "--energy", "my_model/spring", "--returns", "x1", "--force", "--count", "2")
+        assert run("check", *arguments)[0] == status
+    status, _, err = run("export", "my_model/sprong", "--out", "golden")
+    assert status == 2 and "sprong: no such energy; there are spring" in err
+
+
 # -- a second document ------------------------------------------------------------------------------------------------
 
 
@@ -266,7 +276,7 @@ def test_the_package_is_a_project_like_any_other(folder: Path) -> None:
         ("empty/spring", "has no energy (*.py) and no document"),
         ("two", "two: has 2 documents, a.md and b.md; give each a folder of its own"),
         ("lost", "its energies name the document c.md, which is not there"),
-        ("my_model/my_model.md/x", "is a file; give the folder that it is in"),
+        ("my_model/my_model.md/x", "is a file; give the folder that it is in, my_model"),
     ],
 )
 def test_a_folder_that_is_none_is_told(place: Path, started: Path, run: Any, target: str, words: str) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from yarnverify import cli, notebook
+from yarnverify.accuracy.cells import kernel
 from yarnverify.generation import generate_kernels
 from yarnverify.init import init
 from yarnverify.project import project
@@ -44,16 +45,14 @@ def file_of_the_readme(name: str) -> str:
     return found[1]
 
 
-def test_the_energy_of_the_readme_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_energy_of_the_readme_works(tmp_path: Path) -> None:
     init(tmp_path / "my_model")
     (tmp_path / "my_model" / "spring.py").unlink()
     (tmp_path / "my_model" / "my_model.md").unlink()
     path = tmp_path / "my_model" / "barrier.py"
     path.write_text(file_of_the_readme("my_model/barrier.py"), encoding="utf-8")
     generate_kernels(False, cache=False, of=project(tmp_path / "my_model"))
-    monkeypatch.syspath_prepend(str(tmp_path))
-    import my_model.kernels.barrier as barrier  # type: ignore[import-not-found]  # written just now
-
+    barrier = kernel("accurate", "barrier", tmp_path / "my_model")
     assert barrier.energy([[0.0], [0], [0], [1], [0], [0]], k=1.0, h=0.5)[0] == 0
 
 

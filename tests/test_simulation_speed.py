@@ -67,7 +67,7 @@ def test_floors_count_the_bytes_of_what_is_there() -> None:
     cloth = Cloth.made(6, "direct")
     cloth.step(1)
     floors, system = cloth.floors(), cloth.dynamics.system
-    assert floors["factorise"] == 12 * system.pattern.indices.size + cloth.solver.factor.bytes
+    assert floors["factorise"] == 12 * system.pattern.indices.size + cloth.solver.bytes
     outputs = sum(
         t.table.count * (1 + 2 * len(t.table.rows) + len(t.table.rows) * (len(t.table.rows) + 1) // 2)
         for t in system.terms

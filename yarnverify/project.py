@@ -64,8 +64,9 @@ def project(folder: Path | None = None) -> Project:
         kernels = Path(__file__).parent / "kernels"
         return Project(mine, _document(mine), kernels, "yarnverify.kernels", Path("reports"), "")
     if not folder.is_dir():
-        what = "is a file; give the folder that it is in" if folder.exists() else "no such folder"
-        raise InputError(f"{folder}: {what}; a new one is made by: yarnverify init {folder}")
+        if folder.exists():
+            raise InputError(f"{folder}: is a file; give the folder that it is in, {folder.parent}")
+        raise InputError(f"{folder}: no such folder; a new one is made by: yarnverify init {folder}")
     document = _document(folder)
     if not document and not any(folder.glob("*.py")):
         raise InputError(

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from yarnverify.commands.shared import Json, progress, stop, write_json
+from yarnverify.commands.shared import Json, named, progress, stop, write_json
 
 
 def check(
@@ -77,6 +77,7 @@ def check(
     from yarnverify.check.setting import Options, write_states
     from yarnverify.check.show import record, show
 
+    energy, derivations = named(energy, derivations)
     options = Options(
         energy, order, tuple(returns or ()), force, jacobian, layout, column_major, float32, with_, fix, count, regime,
         extreme, time_limit, derivations,
@@ -111,10 +112,11 @@ def export(
     Parameters
     ----------
     energy
-        Name of a declared energy, such as bending.
+        Name of a declared energy, such as bending; one of your own as FOLDER/NAME.
     """
     from yarnverify.export.command import export as run
 
+    name, derivations = named(energy, derivations)
     with progress("exporting") as advance:
-        lines = run(energy, out, derivations, count, extreme, advance)
+        lines = run(name or energy, out, derivations, count, extreme, advance)
     print("\n".join(lines))

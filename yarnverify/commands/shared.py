@@ -68,6 +68,16 @@ def finish(outcome: Outcome, target: Path | None) -> None:
         sys.exit(1)
 
 
+def named(energy: str | None, derivations: Path | None) -> tuple[str | None, Path | None]:
+    """An energy and the folder that declares it, where the name is ``FOLDER/NAME``."""
+    if energy is None or derivations is not None:
+        return energy, derivations
+    from yarnverify.project import find
+
+    place, name = find(energy)
+    return name, place.folder if place.own else None
+
+
 @contextmanager
 def progress(what: str) -> Iterator[Callable[[str, int], None]]:
     """A progress bar on standard error, if that is a terminal."""

@@ -82,22 +82,22 @@ class System:
         self.pattern = Pattern(self.size, self.active, [*tables, *others])
         self.scatter: Scatter = Loops() if self.engine == "compiled" else Arrays()
         self._forms: list[Form] = [form_of(t.kernel) if definite == "quick" else eigenvalues for t in self.terms]
-        self._calls = Calls(self.engine)
+        self.calls = Calls(self.engine)
         self.nodes, self.coordinates = owners(np.asarray(Q, float), self.active, tables)
 
     @property
     def seconds(self) -> dict[str, float]:
         """Time spent so far, by ``kernels`` and ``assembly``, as told by ``clock``."""
-        return self._calls.seconds
+        return self.calls.seconds
 
     @property
     def clock(self) -> Callable[[], float]:
         """What tells the time."""
-        return self._calls.clock
+        return self.calls.clock
 
     @clock.setter
     def clock(self, clock: Callable[[], float]) -> None:
-        self._calls.clock = clock
+        self.calls.clock = clock
 
     @property
     def count(self) -> int:
@@ -115,22 +115,22 @@ class System:
             An element has none there.
         """
         total = self._work(Q)
-        for term, _, part, q in self._calls.chunks(self.terms, Q):
-            total += float(np.add.reduce(self._calls.run(term, "E", q, part)[0]))
+        for term, _, part, q in self.calls.chunks(self.terms, Q):
+            total += float(np.add.reduce(self.calls.run(term, "E", q, part)[0]))
         return total
 
     def energies(self, Q: Array) -> dict[str, float]:
         """Energy by the name of its term."""
         found = {term.name: 0.0 for term in self.terms}
-        for term, _, part, q in self._calls.chunks(self.terms, Q):
-            found[term.name] += float(np.add.reduce(self._calls.run(term, "E", q, part)[0]))
+        for term, _, part, q in self.calls.chunks(self.terms, Q):
+            found[term.name] += float(np.add.reduce(self.calls.run(term, "E", q, part)[0]))
         return found
 
     def slope(self, Q: Array) -> Array:
         """Derivative of the energy in every entry of a configuration, held ones too, (size,): there it is the reaction."""
         total = np.zeros(self.size)
-        for term, _, part, q in self._calls.chunks(self.terms, Q):
-            g = self._calls.run(term, "G", q, part)[0]
+        for term, _, part, q in self.calls.chunks(self.terms, Q):
+            g = self.calls.run(term, "G", q, part)[0]
             self.scatter.entries(total, term.table.rows[:, part], g)
         return total - self.loads
 
@@ -146,19 +146,19 @@ class System:
         """All at once."""
         total, force = self._work(Q), float(np.abs(self.loads).max(initial=0.0))
         slope, sums = np.zeros(self.size), self.pattern.zero()
-        for term, number, part, q in self._calls.chunks(self.terms, Q):
+        for term, number, part, q in self.calls.chunks(self.terms, Q):
             places = self.pattern.places[number]
             if not places.pairs.size:
-                e, g = self._calls.run(term, "EG", q, part)
+                e, g = self.calls.run(term, "EG", q, part)
                 packed = None
             elif definite and self._forms[number] in ALONE:
-                e, g = self._calls.run(term, "EG", q, part)
-                packed = self._calls.memory(len(term.kernel.DOFS), e.size)[2]
-                self._calls.form(self._forms[number], term, q, part, packed, places)
+                e, g = self.calls.run(term, "EG", q, part)
+                packed = self.calls.memory(len(term.kernel.DOFS), e.size)[2]
+                self.calls.form(self._forms[number], term, q, part, packed, places)
             else:
-                e, g, packed = self._calls.run(term, "EGH", q, part)
+                e, g, packed = self.calls.run(term, "EGH", q, part)
                 if definite:
-                    self._calls.form(self._forms[number], term, q, part, packed, places)
+                    self.calls.form(self._forms[number], term, q, part, packed, places)
             start = self.clock()
             total += float(np.add.reduce(e))
             most, least = np.maximum.reduce(g, None, initial=0.0), np.minimum.reduce(g, None, initial=0.0)
@@ -184,7 +184,7 @@ class System:
             if not at.size:
                 continue
             rows = term.table.rows[:, at]
-            e, g = self._calls.run(term, "EG", Q[rows], at, fresh=True)
+            e, g = self.calls.run(term, "EG", Q[rows], at, fresh=True)
             size = np.where(rows == entry, np.abs(g), 0).max(axis=0)
             k = int(np.argmax(size))
             if found is None or size[k] > found[0]:

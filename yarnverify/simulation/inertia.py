@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from yarnverify.kernels.batch import Batch, upper
+from yarnverify.kernels.batch import upper
 from yarnverify.simulation.assembly import System, Term
 from yarnverify.simulation.calls import CHUNK
 from yarnverify.simulation.pattern import Elements, zeros
@@ -60,14 +60,15 @@ class Inertia:
         self._key = b""
 
     def _run(self, wanted: str, q: Array, part: slice) -> list[Array]:
-        term = self.term
-        return Batch(term.kernel.KERNEL, wanted, q, term.some(part), engine=self.system.engine).results()
+        return self.system.calls.run(self.term, wanted, q, part)
 
     def _parts(self, Q: Array, V: Array) -> Any:
         rows = self.term.table.rows[: self.half]
         for start in range(0, rows.shape[1], CHUNK):
             part = slice(start, min(start + CHUNK, rows.shape[1]))
-            yield part, rows[:, part], np.concatenate([Q[rows[:, part]], V[rows[:, part]]])
+            q = self.system.calls.memory(2 * self.half, part.stop - part.start)[3]
+            q[: self.half], q[self.half :] = Q[rows[:, part]], V[rows[:, part]]
+            yield part, rows[:, part], q
 
     def kinetic(self, Q: Array, V: Array) -> Kinetic:
         """Energy, momenta and slope for coordinates and velocities (size,) each."""
@@ -108,12 +109,12 @@ class Inertia:
         none = zeros(self.term.kernel.KERNEL)
         pairs = [(i, j, number[half + min(i, j), half + max(i, j)]) for i in axes for j in axes]
         pairs = [pair for pair in pairs if pair[2] not in none]
+        first, second, which = np.array(pairs, int).reshape(-1, 3).T
         total = sparse.csr_array((size, size))
         for part, rows, q in self._parts(self._rest, np.zeros(size)):
             (packed,) = self._run("H", q, part)
-            data, row, column = (np.concatenate(parts) for parts in zip(
-                *((packed[k], rows[i], rows[j]) for i, j, k in pairs), strict=True))  # fmt: skip
-            total = total + sparse.coo_array((data, (row, column)), shape=(size, size)).tocsr()
+            places = rows[first].ravel(), rows[second].ravel()
+            total = total + sparse.coo_array((packed[which].ravel(), places), shape=(size, size)).tocsr()
         return total
 
     def bind(self, Q: Array, *others: Array) -> bool:
@@ -153,6 +154,4 @@ class Inertia:
         for part, _, q in self._parts(self._rest, np.zeros(self.system.size)):
             (packed,) = self._run("H", q, part)
             self.system.scatter.blocks(sums, self._places, part, packed[vv], np.arange(len(pairs)))
-        data = self.system.pattern.matrix(sums).data
-        at = np.flatnonzero(data).astype(self.system.pattern.indptr.dtype)
-        return at, data[at]
+        return self.system.pattern.nonzero(sums)

@@ -21,6 +21,7 @@ from yarnverify.simulation.blocks import Blocks, Elements, groups, zeros
 __all__ = ["Elements", "Pattern", "Places", "zeros"]
 
 Array = NDArray[Any]
+TAKEN = 2**18  # entries of the matrix that are read from the sums at a time
 ROWS = 16384  # blocks whose rows are made at a time, so that memory on the way stays small
 
 
@@ -175,7 +176,24 @@ class Pattern:
         """The full symmetric matrix of sums (sums + 9,)."""
         found = sparse.csc_array.__new__(sparse.csc_array)
         found.__dict__ |= self._empty.__dict__  # a copy without the checks, which small matrices would feel
-        found.data = sums.take(self._source)
+        found.data = self._entries(sums)
+        return found
+
+    def nonzero(self, sums: Array) -> tuple[Array, Array]:
+        """Places and values of the entries of the matrix that are not zero."""
+        places, values = [np.empty(0, self.indptr.dtype)], [np.empty(0)]
+        for start in range(0, self._source.size, TAKEN):
+            entries = sums.take(self._source[start : start + TAKEN])
+            at = np.flatnonzero(entries)
+            places.append((start + at).astype(self.indptr.dtype))
+            values.append(entries[at])
+        return np.concatenate(places), np.concatenate(values)
+
+    def _entries(self, sums: Array) -> Array:
+        found = np.empty(self._source.size)
+        for start in range(0, found.size, TAKEN):  # all at once, NumPy would copy the indices to twice their size
+            part = slice(start, start + TAKEN)
+            np.take(sums, self._source[part], out=found[part], mode="clip")
         return found
 
     @cached_property
@@ -191,7 +209,7 @@ class Pattern:
     def skew(self, sums: Array) -> sparse.csr_array:
         """The matrix that has the summed entries above its diagonal and their negatives below."""
         row = np.repeat(np.arange(self.count, dtype=np.int32), np.diff(self.indptr))
-        data = sums.take(self._source) * np.sign(self.indices - row)
+        data = self._entries(sums) * np.sign(self.indices - row)
         return sparse.csr_array((data, self.indices, self.indptr), shape=(self.count, self.count))
 
     @property

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from yarnverify.kernels import ElementError
 from yarnverify.simulation.linear import Factor, LinearSolveError
@@ -27,6 +28,7 @@ __all__ = ["EPSILON", "Equilibrium", "Iteration", "NotConverged", "Options", "Se
 
 Array = NDArray[Any]
 EPSILON = float(np.finfo(float).eps)
+_NOTHING = sparse.csc_array((0, 0))
 
 
 def greatest(values: Array) -> float:
@@ -89,6 +91,7 @@ class Search:
                     return Equilibrium(self.Q, value.energy, self.history, negative, self.departures, self.steps.seconds,
                                        value.gradient, left)  # fmt: skip
                 continue
+            value, factor = value._replace(matrix=_NOTHING), None  # their memory goes before that of the next comes
             progress |= size < 0.5 * self._step
             self._step = min(size, self._step)
             self._stale = 0 if progress or self.searching else self._stale + 1

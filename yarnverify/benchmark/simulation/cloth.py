@@ -33,21 +33,21 @@ class _Enough(Exception):
 
 @dataclass(eq=False)
 class Timed:
-    """A solver that keeps the time it takes and the last factor that it made."""
+    """A solver that keeps the time it takes and the size of the last factor that it made."""
 
     solver: Solver
     seconds: dict[str, float] = field(default_factory=lambda: {"factorise": 0.0, "solve": 0.0})
     solves: int = 0
     inner: int = 0
-    factor: Any = None
+    bytes: int = 0
 
     def factorise(self, matrix: Any) -> Factor:
         """The factor, timed."""
-        self.factor = None  # its memory goes before that of the next one comes
         start = thread_time()
-        self.factor = self.solver.factorise(matrix)
+        factor: Any = self.solver.factorise(matrix)
         self.seconds["factorise"] += thread_time() - start
-        return _Solving(self, self.factor)
+        self.bytes = factor.bytes
+        return _Solving(self, factor)
 
 
 @dataclass(eq=False)
@@ -142,7 +142,7 @@ class Cloth:
             kernels += 8 * n * (2 * dof + 1 + dof * (dof + 1) // 2)
             sums += 8 * n * (2 * dof + places.pairs.size)
         matrix = 12 * system.pattern.indices.size
-        factor = self.solver.factor.bytes if self.solver.factor is not None else 0
+        factor = self.solver.bytes
         once = matrix + 2 * factor + 8 * 8 * system.count  # of conjugate gradients: matrix, bands twice, eight vectors
         iterative = isinstance(self.solver.solver, ConjugateGradients)
         inner = self.solver.inner / max(self.solver.solves, 1)

@@ -175,7 +175,7 @@ def _spread(start: Array, ranks: Array) -> Array:
 
 
 class _Eliminated(NamedTuple):
-    """A group's factor: Cholesky (lower, below = L21), or LU with pivots (below = the block itself)."""
+    """A group's factor: Cholesky (lower triangle, packed; below = L21), or LU with pivots (below = the block itself)."""
 
     factor: Array
     below: Array
@@ -190,7 +190,7 @@ def _eliminate(own: Array, below: Array, left: Array) -> tuple[_Eliminated, Arra
         if below.size:
             below = blas.dtrsm(1.0, factor, below, side=1, lower=1, trans_a=1, overwrite_b=1)
             left = blas.dsyrk(-1.0, below, beta=1.0, c=left, lower=1, overwrite_c=1)
-        return _Eliminated(factor, below, None, 0), left
+        return _Eliminated(lapack.dtrttp(factor, uplo="L")[0], below, None, 0), left
     own = np.tril(own) + np.tril(own, -1).T
     factor, pivots, info = lapack.dgetrf(own)
     if info or not np.isfinite(factor).all():
@@ -231,7 +231,7 @@ class MultifrontalFactor:
         for front, (factor, below, pivots, _) in zip(self._fronts, self._done, strict=True):
             mine = x[front.first : front.last]
             if pivots is None:
-                mine[:] = change = blas.dtrsv(factor, mine, lower=1)
+                mine[:] = change = blas.dtpsv(mine.size, factor, mine, lower=1)
             else:
                 change = lapack.dgetrs(factor, pivots, mine)[0]
             if front.touched.size:
@@ -241,7 +241,9 @@ class MultifrontalFactor:
             if front.touched.size:
                 mine -= below.T @ x[front.touched]
             mine[:] = (
-                blas.dtrsv(factor, mine, lower=1, trans=1) if pivots is None else lapack.dgetrs(factor, pivots, mine)[0]
+                blas.dtpsv(mine.size, factor, mine, lower=1, trans=1)
+                if pivots is None
+                else lapack.dgetrs(factor, pivots, mine)[0]
             )
         found = np.empty_like(x)
         found[self._order] = x
