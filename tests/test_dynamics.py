@@ -344,6 +344,32 @@ def test_a_run_taken_up_again_has_the_same_bits(scheme, tolerance, tmp_path):
         assert np.asarray(value).tobytes() == np.asarray(getattr(found, name)).tobytes(), name
 
 
+def test_a_long_step_of_a_cloth_that_slides_and_falls() -> None:
+    """From rest, flat: Newton's full steps leave it for good, and the step is found by way of frozen inertia."""
+    cloth = weave("plain", size=(4, 4), L=1e-3, R=0.15e-3, tails=1e-3)
+    terms = [
+        Term(stretch, segments(cloth), {"k_s": 50.0}),
+        Term(bending, bends(cloth), {"k_b": 1e-9}),
+        Term(shear, shears(cloth), {"k_x": 1e-3}),
+        Term(gravity, segments(cloth, gravity), {"rho": 2e-5, "g": G}),
+    ]
+    corners = cloth.positions([cloth.node(0, -1), cloth.node(-1, -1)])
+    free = np.r_[np.setdiff1d(cloth.positions(), corners), cloth.slides()]
+    mass = Term(kinetic, segments(cloth, kinetic), {"rho": 2e-5})
+    motion = Dynamics(cloth.Q, terms, free, mass, scheme="implicit_euler")
+    start = motion.start(cloth.Q)
+    step = motion._increment(start, 5e-3)
+    with pytest.raises(NotConverged):
+        step._newton(start.Q, None, 30)
+    end = motion.step(start, 5e-3)
+    left, size = step.residual(end.Q)
+    assert np.abs(left).max() < 1e-6 * size  # rounding of positions times 5e4 N/m
+    fallen = (end.Q - cloth.Q)[cloth.position(cloth.node(1, 0))[0, 2]]
+    assert (
+        -1.5 * 9.81 * 5e-3**2 * 1.1 < fallen < -1e-5
+    )  # the scheme's free fall is g h^2; the edge swings about the corners
+
+
 # -- what goes wrong
 
 

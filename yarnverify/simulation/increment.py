@@ -19,8 +19,10 @@ from numpy.typing import NDArray
 
 from yarnverify.kernels import ElementError
 from yarnverify.simulation.assembly import Evaluation, Worst
+from yarnverify.simulation.frozen import Frozen
 from yarnverify.simulation.inertia import Inertia
 from yarnverify.simulation.linear import LinearSolveError, SuperLU
+from yarnverify.simulation.newton import minimise
 from yarnverify.simulation.search import EPSILON, Iteration, NotConverged
 
 Array = NDArray[Any]
@@ -115,13 +117,26 @@ class Increment:
         return total[system.active], float(size)
 
     def solve(self, Q: Array, solver: Any = None, iterations: int = 60) -> Array:
-        """The end of the step by Newton's method on the residual.
+        """The end of the step by Newton's method on the residual, started anew with frozen inertia where it fails.
 
         Raises
         ------
         NotConverged
             No solution after so many iterations, or no step possible.
         """
+        try:
+            return self._newton(Q, solver, iterations // 2)
+        except NotConverged as error:
+            failed = error
+        for _ in range(3):
+            try:
+                Q = minimise(Frozen(self, Q), Q, residual=1e-9, step=1e-12, stable=False, iterations=100).Q
+                return self._newton(Q, solver, iterations // 2)
+            except (NotConverged, ElementError) as error:
+                failed = error if isinstance(error, NotConverged) else failed
+        raise failed
+
+    def _newton(self, Q: Array, solver: Any, iterations: int) -> Array:
         system = self.inertia.system
         history: list[Iteration] = []
         solver = solver or SuperLU(self.nodes, self.coordinates)
