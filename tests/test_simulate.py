@@ -27,6 +27,9 @@ from yarnverify.simulation.scene import scene
 from yarnverify.simulation.setting import Known, Moving, Static, ramp
 
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever runs the tests may have it ignored
+
+
 @scene(title="a swing", size="segments", sizes=(3,), solvers=("direct",))
 def swing(size: int, until: float = positive(0.2, "s"), steps: int = whole(40), pause: float = positive(1e-9, "s"),
           rest: str = choice("no", "yes")) -> Moving | Static:
