@@ -270,7 +270,7 @@ def test_an_error_below_a_unit_never_counts_as_grown() -> None:
     [
         (["cheer"], 2, "cheer: no such energy"),
         (["--variant", "quick"], 2, "quick: no such variant"),
-        (["--check", "--out", "/nowhere"], 2, "yarnverify accuracy --write"),
+        (["--check", "--out", "/nowhere"], 2, "the same command with --write instead of --check makes it"),
         (["--write", "bending"], 2, "--write takes the whole sweep"),
         (["--executor", "grid"], 2, "give serial"),
         (["--replay", "nonsense"], 2, "give ENERGY VARIANT"),

@@ -89,7 +89,7 @@ def kernel(variant: str, energy: str, folder: str | Path = "") -> Any:
         Where there is none.
     """
     missing = InputError(f"{variant} {energy}: there is no such kernel")
-    if not folder:
+    if not folder or Path(folder) == derivations():
         try:
             return importlib.import_module(f"yarnverify.kernels.{variant}.{energy}")
         except ModuleNotFoundError:
