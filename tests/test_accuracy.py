@@ -279,6 +279,9 @@ def test_a_cell_says_what_was_found_and_how_to_see_it_again(folder: Path) -> Non
     assert json.loads(json.dumps(cell)) == cell
 
 
+PROMISING = types.SimpleNamespace(promise="units")  # a kernel that its variant's target holds for
+
+
 def _broken(name: str, change: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """The differentiated kernel of an energy under the name of the accurate one, with something changed."""
     module = kernel("differentiated", name)
@@ -288,9 +291,9 @@ def _broken(name: str, change: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         return change(e.copy(), g.copy(), h.copy())
 
     made = types.SimpleNamespace(
-        evaluate=evaluate, energy=module.energy, gradient=module.gradient, hessian=module.hessian
+        KERNEL=PROMISING, evaluate=evaluate, energy=module.energy, gradient=module.gradient, hessian=module.hessian
     )
-    monkeypatch.setattr(cells_module, "kernel", lambda variant, energy: made)
+    monkeypatch.setattr(cells_module, "kernel", lambda variant, energy, folder: made)
 
 
 def _sign(e: Array, g: Array, h: Array) -> Any:
@@ -357,8 +360,10 @@ def test_the_reference_is_held_to_one_unit_by_component(folder: Path, declaratio
     made = declared(declarations, "bending")
     points = points_of(made, REGIMES[0], "float64", 3, 0)
     exact = truth(made, points)
-    perfect = types.SimpleNamespace(evaluate=lambda q, **rest: (exact.energy, exact.gradient, exact.hessian))
-    monkeypatch.setattr(cells_module, "kernel", lambda variant, energy: perfect)
+    perfect = types.SimpleNamespace(
+        KERNEL=PROMISING, evaluate=lambda q, **rest: (exact.energy, exact.gradient, exact.hessian)
+    )
+    monkeypatch.setattr(cells_module, "kernel", lambda variant, energy, folder: perfect)
     found = cells(made, points, unit(folder, variants=("reference",)))
     assert all(0 < part["of_target"] <= 1 for part in found[0]["outputs"].values())
     exact.hessian[3, 4, 0] *= 1 + 4 * U
@@ -370,12 +375,13 @@ def test_invented_results_are_counted(folder: Path, declarations: Any, monkeypat
     regime = next(r for r in REGIMES if r.name == "without value")
     points = points_of(made, regime, "float64", 12, 0)
     zero = types.SimpleNamespace(
+        KERNEL=PROMISING,
         evaluate=lambda q, **rest: (np.zeros(q.shape[1]), np.zeros(q.shape), np.zeros((11, *q.shape))),
         energy=lambda q, **rest: np.zeros(q.shape[1]),
         gradient=lambda q, **rest: np.zeros(q.shape),
         hessian=lambda q, **rest: np.zeros((11, *q.shape)),
     )
-    monkeypatch.setattr(cells_module, "kernel", lambda variant, energy: zero)
+    monkeypatch.setattr(cells_module, "kernel", lambda variant, energy, folder: zero)
     found = cells(made, points, unit(folder, variants=("accurate",)))
     assert found[0]["invented"] == 12 == found[0]["without_value"]
     assert any("results where there are none" in line for line in missed_targets({"cells": found}))
@@ -485,12 +491,13 @@ def test_a_perfect_kernel_meets_every_target_in_every_regime(
         return found.energy, found.gradient, found.hessian
 
     perfect = types.SimpleNamespace(
+        KERNEL=PROMISING,
         evaluate=evaluate,
         energy=lambda q, errors, **given: results(q, **given).energy,
         gradient=lambda q, errors, **given: results(q, **given).gradient,
         hessian=lambda q, errors, **given: results(q, **given).hessian,
     )
-    monkeypatch.setattr(cells_module, "kernel", lambda variant, energy: perfect)
+    monkeypatch.setattr(cells_module, "kernel", lambda variant, energy, folder: perfect)
     for regime in regimes(made):
         asked = unit(folder, energy=name, regime=regime.name, variants=("accurate", "fast", "reference"), count=12)
         found = run_unit(asked)["cells"]
