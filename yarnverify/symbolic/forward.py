@@ -151,8 +151,9 @@ class Evaluation:
             return {"sin": lambda: sine, "cos": lambda: cosine, "tan": lambda: sine / _nonzero(cosine)}[
                 str(expr.value)
             ]()
-        if op == "pow" and jets and isinstance(self.numbers, Balls) and (cosine := self._cosine_of(expr)) is not None:
-            return self._power_of_angle(self._value(cosine, jets), int(str(expr.value)))
+        if op == "pow" and jets and isinstance(self.numbers, Balls) and expr.value in _EVEN:
+            square = self._square(expr.args[0])
+            return square if expr.value == 2 else self._power(square, int(str(expr.value)) // 2)
         values = [self._value(arg, jets) for arg in expr.args]
         first = values[0]
         if op == "add":
@@ -231,22 +232,45 @@ class Evaluation:
         slope = 1 / inner if function == "log" else result
         return value.chain(result, slope, -slope * slope if function == "log" else result)
 
-    def _cosine_of(self, expr: Expr) -> Expr | None:
-        """The tree under the arc cosine of which this one is an even positive power; None if it is anything else."""
-        assert isinstance(expr.value, int)
-        base = expr.args[0]
-        while base.op == "neg" or (base.op == "symbol" and self.section.meaning(base.name) is not None):
-            base = base.args[0] if base.op == "neg" else self.section.meaning(base.name)  # type: ignore[assignment]
-        even = expr.value > 0 and expr.value % 2 == 0
-        return base.args[0] if even and base.op == "call" and base.value == "arccos" else None
+    def _square(self, expr: Expr) -> Any:
+        """The square of a scalar. Those of an angle, its sine and the tangent of its half are smooth where the angle is 0."""
+        if expr.op == "neg" or (expr.op == "symbol" and self.section.meaning(expr.name) is not None):
+            inside = expr.args[0] if expr.op == "neg" else self.section.meaning(expr.name)
+            assert inside is not None
+            return self._square(inside)
+        if expr.op == "mul":
+            squares = [self._square(arg) for arg in expr.args]
+            return math.prod(squares[1:], start=squares[0])
+        if expr.op == "frac":
+            return self._square(expr.args[0]) / _nonzero(self._square(expr.args[1]))
+        if expr.op == "call":
+            angle, part = (expr, Fraction(1)) if expr.value == "arccos" else self._angle_of(expr.args[0])
+            if angle is not None:
+                jet = Jet._lift(self._value(angle.args[0], True))
+                if expr.value == "arccos":
+                    return jet.chain(*self.numbers.squared_arccos(jet.value))
+                if expr.value == "sin" and part == 1:
+                    return 1 - jet * jet
+                if expr.value == "tan" and part == Fraction(1, 2):
+                    return (1 - jet) / _nonzero(1 + jet)
+        value = self._value(expr, True)
+        return value * value
 
-    def _power_of_angle(self, cosine: Any, power: int) -> Any:
-        """An even power of an angle, which unlike the angle is smooth where the angle is 0."""
-        jet = Jet._lift(cosine)
-        square = jet.chain(*self.numbers.squared_arccos(jet.value))
-        result = square
-        for _ in range(power // 2 - 1):
-            result = result * square
+    def _angle_of(self, expr: Expr) -> tuple[Expr | None, Fraction]:
+        """The arc cosine of which a tree is a multiple, and the multiple."""
+        parts = list(linear_form(expr, self.section.meaning).items())
+        angle = tree_of(parts[0][0]) if len(parts) == 1 else None
+        return (
+            (angle, parts[0][1])
+            if angle is not None and angle.op == "call" and angle.value == "arccos"
+            else (None, Fraction(0))
+        )
+
+    @staticmethod
+    def _power(value: Any, power: int) -> Any:
+        result = value
+        for _ in range(power - 1):
+            result = result * value
         return result
 
     def _circle(self, expr: Expr, jets: bool) -> Pair:
@@ -282,6 +306,9 @@ class Evaluation:
         if not isinstance(value, Jet):
             return sine, cosine
         return value.chain(sine, cosine, -sine), value.chain(cosine, -sine, -cosine)
+
+
+_EVEN = range(2, 64, 2)
 
 
 def _nonzero(value: Any) -> Any:

@@ -401,8 +401,8 @@ def promise(variant: str, found: Proved, calls: bool) -> str:
         return "none"
     if variant == "reference":
         return "units"
-    compares = any(_compares_angles(shape) for shape in found.shapes)
-    return "units" if variant == "accurate" and found.shapes and not compares else "condition"
+    less = any(_compares_angles(shape) or shape.has_pole for shape in found.shapes)
+    return "units" if variant == "accurate" and found.shapes and not less else "condition"
 
 
 def _compares_angles(shape: Safe) -> bool:

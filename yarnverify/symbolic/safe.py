@@ -297,6 +297,14 @@ class Safe:
             ]
             yield (force, self.gradient(row, scale)), rest
 
+    @property
+    def has_pole(self) -> bool:
+        """Whether the law is infinite at a fold, as the tangent of half the angle is."""
+        if self.corner is None:
+            return False
+        poles = {self.corner.name("half"), self.corner.name("vercosine")}
+        return any(node.op == "symbol" and node.name in poles for node in self.law.walk())
+
     def check(self) -> dict[str, Finding]:
         """Proof of the law and of every block."""
         blocks = list(self.blocks(FORCE))

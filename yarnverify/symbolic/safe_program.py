@@ -66,8 +66,9 @@ def safe_program(
         choice = _SMOOTH_UP_TO - _symbol(safe.corner.name("C"))
     if safe.corner is not None and safe.shape == "polar":
         ends = "0 or pi" if alone else "0" if safe.corner.sign > 0 else "pi"
-        text = f"{safe.corner.symbol} is {ends}, where the energy has no derivative"
-        checks.append((_symbol(safe.corner.name("size")), "derivatives", text))
+        what, level = ("value", "energy") if safe.has_pole and not alone else ("derivative", "derivatives")
+        text = f"{safe.corner.symbol} is {ends}, where the energy has no {what}"
+        checks.append((_symbol(safe.corner.name("size")), level, text))
         if guarded:
             choice = _symbol(safe.corner.name("s")) - _PLAIN_DOWN_TO
     sums = Sums(energy, safe, reading, digits)
