@@ -66,7 +66,8 @@ def build_report(
         for name, record in records.items()
     }
     if of.own and not check:
-        lines += _sweep(of, out, advance)
+        said, met = _sweep(of, out, advance)
+        lines, expected = [*lines, *said], expected and met
     measured = _measured(out)
     if pictures:
         _draw(out / "pictures", measured, list(records["derivations"]), lines)
@@ -158,15 +159,16 @@ def _measured(out: Path) -> dict[str, Any]:
     return found
 
 
-def _sweep(of: Project, out: Path, advance: Callable[[str, int], None]) -> list[str]:
-    """Measure the kernels of a project on their hard cases and write the record; what to say of it."""
+def _sweep(of: Project, out: Path, advance: Callable[[str, int], None]) -> tuple[list[str], bool]:
+    """Measure the kernels of a project on their hard cases and write the record; what to say, and whether all met targets."""
     from yarnverify.accuracy.command import accuracy
+    from yarnverify.accuracy.record import missed_targets
 
     try:
         measured = accuracy((), (), "quick", "processes", None, None, out, True, False, advance, of)
     except NotRunError as error:
-        return [f"Not measured: {error}"]
-    return measured.lines[-1:]
+        return [f"Not measured: {error}"], True
+    return [*missed_targets(measured.record), measured.lines[-1]], not measured.differs
 
 
 def _records(of: Project, check: bool, advance: Callable[[str, int], None]) -> tuple[dict[str, Any], list[str], bool]:

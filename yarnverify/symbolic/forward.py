@@ -243,7 +243,9 @@ class Evaluation:
             return math.prod(squares[1:], start=squares[0])
         if expr.op == "frac":
             return self._square(expr.args[0]) / _nonzero(self._square(expr.args[1]))
-        if expr.op == "call":
+        if expr.op == "call" and (plain := unfolded(expr)) is not None:
+            return self._square(plain)
+        if expr.op == "call" and expr.value in ("arccos", "sin", "tan"):
             angle, part = (expr, Fraction(1)) if expr.value == "arccos" else self._angle_of(expr.args[0])
             if angle is not None:
                 jet = Jet._lift(self._value(angle.args[0], True))
