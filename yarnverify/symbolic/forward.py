@@ -238,7 +238,7 @@ class Evaluation:
             inside = expr.args[0] if expr.op == "neg" else self.section.meaning(expr.name)
             assert inside is not None
             return self._square(inside)
-        if expr.op == "mul":
+        if expr.op == "mul" and not any(isinstance(self._value(arg, True), np.ndarray) for arg in expr.args):
             squares = [self._square(arg) for arg in expr.args]
             return math.prod(squares[1:], start=squares[0])
         if expr.op == "frac":
