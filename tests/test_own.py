@@ -180,7 +180,7 @@ def kinds(place: Path) -> Path:
     folder.mkdir()
     for name, text in KINDS.items():
         (folder / f"{name}.py").write_text(HEAD + text, encoding="utf-8")
-    generate_kernels(False, cache=False, of=project(folder))
+    generate_kernels(False, of=project(folder))
     return folder
 
 
@@ -225,7 +225,7 @@ def test_what_a_logarithm_cannot_be_taken_of_is_named(kinds: Path) -> None:
 
 
 def test_what_has_no_kernel_is_told_with_its_reason(kinds: Path) -> None:
-    notes = generate_kernels(True, cache=False, of=project(kinds)).lines
+    notes = generate_kernels(True, of=project(kinds)).lines
     assert "barrier: no variant in twice the digits: there is no log in these" in notes
     assert not (kinds / "kernels" / "reference" / "barrier.py").exists()
 

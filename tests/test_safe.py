@@ -146,9 +146,10 @@ def made(declared: Energy, variant: str) -> Any:
     """The module of a declared energy, as ``generate`` would write it; what it rests on is proved in a test of its own."""
     derivation = derive_declared(declared, ())
     assert derivation is not None
-    programs, notes = derived_programs(declared, Proved(derivation, tuple(safe.safe_shapes(derivation))), variant)
+    found = Proved(derivation, tuple(safe.safe_shapes(derivation)))
+    programs, notes = derived_programs(declared, found, variant)
     assert not notes
-    text, _ = module_text(declared, variant, programs, "own.md", notes)
+    text, _ = module_text(declared, variant, programs, ["own.md"], notes, found)
     namespace: dict[str, Any] = {}
     exec(compile(text, f"<{declared.name}>", "exec"), namespace)
     return type("Module", (), namespace)
