@@ -60,6 +60,22 @@ def empty_outputs(dof: int, n: int) -> Outputs:
     return np.empty(n), np.empty((dof, n)), np.empty((sizes(dof), n))
 
 
+def kept(make: Callable[[int], Outputs]) -> Callable[[int], Outputs]:
+    """Arrays for so many elements, the same ones again as long as the number stays, as a simulation keeps its own.
+
+    What the system takes to hand out fresh memory varies threefold from call to call, and is nobody's formula.
+    """
+    last: dict[int, Outputs] = {}
+
+    def arrays(n: int) -> Outputs:
+        if n not in last:
+            last.clear()
+            last[n] = make(n)
+        return last[n]
+
+    return arrays
+
+
 def unified(way: Way, outputs: Outputs) -> Outputs:
     """Outputs of any way as (n,), (dof, n) and (dof, dof, n)."""
     e, g, h = (np.asarray(part) for part in outputs)

@@ -13,7 +13,7 @@ import casadi
 import numpy as np
 
 from yarnverify.benchmark.peers.walk import FORMS, Functions, energy_of
-from yarnverify.benchmark.ways import Array, Outputs, Way, degrees_of_freedom, outputs_bytes, sizes
+from yarnverify.benchmark.ways import Array, Outputs, Way, degrees_of_freedom, kept, outputs_bytes, sizes
 from yarnverify.errors import NotRunError
 from yarnverify.symbolic.declare import Energy
 
@@ -65,10 +65,12 @@ def _way(energy: Energy, compiler: str, form: str) -> Way:
     dof = degrees_of_freedom(energy)
     loop = _compiled(compiler, _function(energy, dof, form), dof)
 
+    arrays = kept(lambda n: (np.empty(n), np.empty((n, dof)), np.empty((n, sizes(dof)))))
+
     def run(q: Array, values: tuple[float, ...]) -> Outputs:
         n = q.shape[1]
         q, p = np.ascontiguousarray(q, np.float64), np.array(values)
-        e, g, h = np.empty(n), np.empty((n, dof)), np.empty((n, sizes(dof)))
+        e, g, h = arrays(n)
         loop(n, q.ctypes.data, p.ctypes.data, e.ctypes.data, g.ctypes.data, h.ctypes.data)
         return e, g, h
 

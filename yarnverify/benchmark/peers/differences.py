@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,16 @@ import sympy as sp
 
 from yarnverify.benchmark.peers.symbols import energy_expression
 from yarnverify.benchmark.peers.walk import FORMS
-from yarnverify.benchmark.ways import Array, Outputs, Way, chunks, degrees_of_freedom, empty_outputs, outputs_bytes
+from yarnverify.benchmark.ways import (
+    Array,
+    Outputs,
+    Way,
+    chunks,
+    degrees_of_freedom,
+    empty_outputs,
+    kept,
+    outputs_bytes,
+)
 from yarnverify.symbolic.declare import Energy
 
 PACKAGES = ("numpy", "sympy")
@@ -24,9 +34,11 @@ def ways(energy: Energy) -> tuple[Way, ...]:
     rows, parameters, expression = energy_expression(energy, FORMS[1])
     function = sp.lambdify([*rows, *parameters], expression, modules="numpy", cse=True)
 
+    arrays = kept(partial(empty_outputs, dof))
+
     def way(chunk: int) -> Way:
         def run(q: Array, values: tuple[float, ...]) -> Outputs:
-            out = empty_outputs(dof, q.shape[1])
+            out = arrays(q.shape[1])
             for where in chunks(q.shape[1], chunk):
                 with np.errstate(all="ignore"):  # a shifted state may leave the domain of a root; the result shows it
                     _differences(function, q[:, where], values, *(part[..., where] for part in out))

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import sympy as sp
 
 from yarnverify.benchmark.peers.symbols import expressions
 from yarnverify.benchmark.peers.walk import FORMS
-from yarnverify.benchmark.ways import Array, Outputs, Way, chunks, degrees_of_freedom, empty_outputs, outputs_bytes
+from yarnverify.benchmark.ways import (
+    Array,
+    Outputs,
+    Way,
+    chunks,
+    degrees_of_freedom,
+    empty_outputs,
+    kept,
+    outputs_bytes,
+)
 from yarnverify.symbolic.declare import Energy
 
 PACKAGES = ("sympy",)
@@ -26,9 +36,11 @@ def _ways(energy: Energy, form: str) -> list[Way]:
     dof = degrees_of_freedom(energy)
     temporaries = 8 * (len(sp.cse(outputs, list=False)[0]) + len(outputs))
 
+    arrays = kept(partial(empty_outputs, dof))
+
     def way(chunk: int | None) -> Way:
         def run(q: Array, values: tuple[float, ...]) -> Outputs:
-            return _filled(function, dof, q, values, chunk)
+            return _filled(function, arrays(q.shape[1]), q, values, chunk)
 
         def bytes_at(n: int) -> int:
             return n * outputs_bytes(dof) + temporaries * (chunk or n)
@@ -39,13 +51,13 @@ def _ways(energy: Energy, form: str) -> list[Way]:
     return [way(chunk) for chunk in CHUNKS]
 
 
-def _filled(function: Any, dof: int, q: Array, values: tuple[float, ...], chunk: int | None) -> Outputs:
-    e, g, h = empty_outputs(dof, q.shape[1])
+def _filled(function: Any, out: Outputs, q: Array, values: tuple[float, ...], chunk: int | None) -> Outputs:
+    e, g, h = out
     for where in chunks(q.shape[1], chunk):
         found = function(*q[:, where], *values)
         e[where] = found[0]
-        for i in range(dof):
+        for i in range(g.shape[0]):
             g[i, where] = found[1 + i]
         for i in range(h.shape[0]):
-            h[i, where] = found[1 + dof + i]
+            h[i, where] = found[1 + g.shape[0] + i]
     return e, g, h
