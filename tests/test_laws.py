@@ -36,7 +36,11 @@ EACH = pytest.mark.parametrize("energy", ENERGIES)
 EVERY = pytest.mark.parametrize("variant", VARIANTS)
 SAME_BITS = pytest.mark.parametrize("variant", PORTABLE)
 NOWHERE = st.just((0.0, 0.0, 0.0))
-few = settings(max_examples=40)
+
+
+def few(variant: str) -> settings:
+    """How many examples are tried; fewer where each takes a hundred times as long."""
+    return settings(max_examples=10 if variant == "reference" else 40)
 
 
 def moderate(energy: str, **options: Any) -> st.SearchStrategy[Element]:
@@ -63,7 +67,7 @@ def rows_of(module: Any) -> tuple[list[list[int]], list[int]]:
 def test_hessians_are_symmetric_and_functions_agree(energy: str, variant: str) -> None:
     module = kernel(energy, variant)
 
-    @few
+    @few(variant)
     @given(elements(module))
     def law(element: Element) -> None:
         e, g, h = with_value(module, element)
@@ -83,7 +87,7 @@ def test_an_exact_translation_changes_no_bit(energy: str, variant: str) -> None:
     points, _ = rows_of(module)
     steps = st.integers(-(2**40), 2**40).map(lambda step: step * 2.0**-20)
 
-    @few
+    @few(variant)
     @given(moderate(energy, ratio=length_ratios(1e-3, 1e3), offset=offsets(2.0**10)), st.tuples(steps, steps, steps))
     def law(element: Element, shift: tuple[float, float, float]) -> None:
         q = np.round(element.q * 2**20) / 2**20
@@ -105,7 +109,7 @@ def test_rigid_motion_keeps_the_energy(energy: str, variant: str) -> None:
     module = kernel(energy, variant)
     points, sliding = rows_of(module)
 
-    @few
+    @few(variant)
     @given(moderate(energy, offset=NOWHERE), orientations(), offsets(1e6), st.sampled_from([0.0, 1.0, -1e3]))
     def law(element: Element, rotation: Any, shift: tuple[float, float, float], slide: float) -> None:
         moved = element.q.copy()
@@ -175,7 +179,7 @@ def test_scaling_by_powers_of_two_is_exact(energy: str, variant: str) -> None:
         factors = [factor.partition("^") for factor in parameter.unit.split()]
         powers[str(parameter.name)] = sum({"N": 1, "m": 1}[base] * int(times or 1) for base, _, times in factors)
 
-    @few
+    @few(variant)
     @given(moderate(energy), st.integers(-40, 40))
     def law(element: Element, k: int) -> None:
         e, g, h = with_value(module, element)
@@ -226,7 +230,7 @@ def test_the_sign_of_a_zero_changes_nothing(energy: str, variant: str) -> None:
 def test_a_batch_of_one_has_the_bits_of_a_batch_of_many(energy: str, variant: str) -> None:
     module = kernel(energy, variant)
 
-    @few
+    @few(variant)
     @given(st.lists(elements(module), min_size=2, max_size=8))
     def law(batch: list[Element]) -> None:
         q, parameters = joined(batch)
@@ -269,7 +273,7 @@ def test_chunks_and_their_ends_change_no_bit(energy: str, variant: str, monkeypa
 def test_memory_layout_changes_no_bit(energy: str, variant: str) -> None:
     module = kernel(energy, variant)
 
-    @few
+    @few(variant)
     @given(st.lists(elements(module), min_size=1, max_size=5))
     def law(batch: list[Element]) -> None:
         q, parameters = joined(batch)
@@ -294,7 +298,7 @@ def test_memory_layout_changes_no_bit(energy: str, variant: str) -> None:
 def test_a_bad_element_leaves_the_others_alone(energy: str, variant: str) -> None:
     module = kernel(energy, variant)
 
-    @few
+    @few(variant)
     @given(st.lists(elements(module), min_size=2, max_size=6), st.data())
     def law(batch: list[Element], data: st.DataObject) -> None:
         q, parameters = joined(batch)
@@ -317,7 +321,7 @@ def test_single_precision_stays(energy: str, variant: str) -> None:
         pytest.skip("the variant reference is for double precision alone")
     module = kernel(energy, variant)
 
-    @few
+    @few(variant)
     @given(elements(module, dtype=np.float32))
     def law(element: Element) -> None:
         for function in ("evaluate", "packed", "energy", "gradient", "hessian"):
