@@ -118,6 +118,18 @@ def cosine(x0: Point, x1: Point, x2: Point, *, k: Positive["N m"]) -> Expr:
 
 
 @energy()
+def raised(x0: Point, x1: Point, x2: Point, *, k: Positive["N m"]) -> Expr:
+    """An energy that vanishes at a fold as 1 + cos(theta) does."""
+    return k * (1 + Expr("call", (angle(x1 - x0, x0 - x2),), "cos"))
+
+
+@energy()
+def repelled(x0: Point, x1: Point, x2: Point, *, k: Positive["N m"]) -> Expr:
+    """An energy that is infinite at a fold as 1/(1 + cos(theta)) is."""
+    return k / (1 + Expr("call", (angle(x1 - x0, x0 - x2),), "cos"))
+
+
+@energy()
 def spring(x0: Point, x1: Point, *, k: Positive["N m^-1"], L: Positive["m"]) -> Expr:
     """A spring of rest length L."""
     return k * (length(x1 - x0) - L) ** 2 / 2
@@ -135,9 +147,10 @@ def joint(x0: Point, x1: Point, x2: Point, *, k: Positive["N m"]) -> Expr:
     return k * angle(x1 - x0, x2 - x1) ** 2
 
 
-OWN = (resting, tangent, cosine, spring, crimped, joint)
+OWN = (resting, tangent, cosine, raised, repelled, spring, crimped, joint)
 SHAPES = {
-    "resting": ["polar"], "tangent": ["smooth", "polar"], "cosine": ["smooth", "polar"], "spring": ["smooth"],
+    "resting": ["polar"], "tangent": ["smooth", "polar"], "cosine": ["smooth", "polar"], "raised": ["smooth", "polar"],
+    "repelled": ["smooth", "polar"], "spring": ["smooth"],
     "crimped": ["polar"], "joint": ["smooth", "polar"],
 }  # fmt: skip
 
@@ -227,6 +240,19 @@ def test_a_rest_angle_has_no_gradient_at_a_straight_yarn_and_a_square_has() -> N
         made(resting, "accurate").gradient(straight, k=1.0, theta_0=0.5)
     assert made(resting, "accurate").energy(straight, k=1.0, theta_0=0.5)[0] == 0.125
     assert np.isfinite(made(tangent, "accurate").hessian(straight, k=1.0)).all()
+
+
+@pytest.mark.parametrize(("declared", "pole"), [(tangent, True), (repelled, True), (raised, False), (cosine, False)])
+def test_a_pole_at_a_fold_has_no_value_and_promises_less(declared: Energy, pole: bool) -> None:
+    module = made(declared, "accurate")
+    assert module.KERNEL.promise == ("condition" if pole else "units")
+    folded = np.array([[0.0, 0, 0, 1, 0, 0, 1, 0, 0, 1, -1]]).T[: len(module.DOFS)]
+    with pytest.raises(
+        ElementError, match="theta is pi, where the energy has no " + ("value" if pole else "derivative")
+    ):
+        module.gradient(folded, k=1.0)
+    if not pole:
+        assert module.energy(folded, k=1.0)[0] == (0.0 if declared is raised else 2.0)
 
 
 # -- damage -----------------------------------------------------------------------------------------------------------

@@ -302,8 +302,11 @@ class Safe:
         """Whether the law is infinite at a fold, as the tangent of half the angle is."""
         if self.corner is None:
             return False
-        poles = {self.corner.name("half"), self.corner.name("vercosine")}
-        return any(node.op == "symbol" and node.name in poles for node in self.law.walk())
+        half, vercosine = self.corner.name("half"), self.corner.name("vercosine")
+        below = (part for node in self.law.walk() if node.op == "frac" for part in node.args[1].walk())
+        return any(node.op == "symbol" and node.name == half for node in self.law.walk()) or any(
+            node.op == "symbol" and node.name == vercosine for node in below
+        )
 
     def check(self) -> dict[str, Finding]:
         """Proof of the law and of every block."""
@@ -358,17 +361,21 @@ def _shape(derivation: Derivation, corner: Corner | None, shape: Shape) -> Safe:
     theta = scalar_symbol(corner.symbol)
     atoms = {base: scalar_symbol(corner.name(base)) for base in _ATOMS}
     variables = {m: scalar_symbol(m.symbol) for m in derivation.measures if m.b is None}
+    c = sp.Symbol("cosine", real=True)
+    whole = {1 - c: atoms["versine"], c - 1: -atoms["versine"], 1 + c: atoms["vercosine"]}  # none of them cancels
+
+    def factored(value: Any) -> Any:
+        value = sp.factor(value).replace(lambda e: e in whole, lambda e: whole[e])
+        return value.subs(c, corner.sign * atoms["C"])
+
     if shape == "smooth":
-        c = sp.Symbol("cosine", real=True)
         law = _in_cosine(derivation.law, theta, c)
-        whole = {1 - c: atoms["versine"], c - 1: -atoms["versine"], 1 + c: atoms["vercosine"]}  # none of them cancels
 
         def settled(value: Any) -> Any:
             value = value.subs(theta_squared(c), atoms["A"])
             value = value.subs({theta_over_sine(c): atoms["f"]})
             value = value.replace(lambda e: e.is_Function and e.func.__name__ == "sine_excess", lambda e: atoms["g"])
-            value = sp.factor(value).replace(lambda e: e in whole, lambda e: whole[e])
-            return value.subs(c, corner.sign * atoms["C"])
+            return factored(value)
 
         second = _in_cosine(sp.diff(derivation.law, theta, 2), theta, c)
         safe = Safe(derivation, shape, corner, False, section, scalar_tree(settled(law)), frozenset(given))
@@ -380,10 +387,10 @@ def _shape(derivation: Derivation, corner: Corner | None, shape: Shape) -> Safe:
 
     def plain(value: Any) -> Any:
         value = value.subs(sp.tan(theta / 2), atoms["half"])
-        value = value.subs({sp.sin(theta): atoms["s"], sp.cos(theta): corner.sign * atoms["C"]})
+        value = value.subs(sp.cos(theta), c).subs(sp.sin(theta) ** 2, 1 - c**2).subs(sp.sin(theta), atoms["s"])
         if value.has(sp.sin, sp.cos, sp.tan):
             raise NoMeasuresError
-        return sp.factor(value)
+        return factored(value)
 
     safe = Safe(derivation, shape, corner, centred, section, scalar_tree(plain(law)), frozenset(given))
     _differentials(safe, law, variables | {corner: variable}, plain, corner.sign)

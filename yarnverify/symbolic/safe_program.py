@@ -210,20 +210,21 @@ def _corner_lines(safe: Safe, corner: Corner, digits: Digits, used: set[str]) ->
     cosine, opposite = atom("C"), f"-{atom('C')}"
     if corner.sign < 0:
         cosine, opposite = opposite, cosine
+
+    def versines(sine_squared: str) -> list[str]:
+        sides = {"versine": cosine, "vercosine": opposite}
+        return [f"{atom(x)} = versine({sine_squared}, {side})" for x, side in sides.items() if atom(x) in used]
+
     if safe.shape == "smooth":
         lines.append(f"{vector('m')} = scaled({vector('normal')}, {atom('scale')})")
         lines.append(_unpacked(corner.name("m", bold=True)))
         lines.append(f"{atom('S')} = dot({vector('m')}, {vector('m')})")
         lines.append(f"{atom('A')}, {atom('f')}, {atom('g')} = turning({atom('S')}, {cosine})")
-        if atom("versine") in used:
-            lines.append(f"{atom('versine')} = versine({atom('S')}, {cosine})")
-        if atom("vercosine") in used:
-            lines.append(f"{atom('vercosine')} = versine({atom('S')}, {opposite})")
-        return lines
+        return lines + versines(atom("S"))
     lines.append(f"{vector('n')}, {atom('size')} = normal_of({vector('normal')})")
     lines.append(f"{atom('s')} = {atom('size')}*{atom('scale')}")
     lines.append(_unpacked(corner.name("n", bold=True)))
     theta = str(_symbol(corner.symbol))
     functions = {theta: "angle", atom("psi"): "deviation", atom("half"): "half_tangent"}
     lines += [f"{name} = {function}({atom('s')}, {cosine})" for name, function in functions.items() if name in used]
-    return lines
+    return lines + versines(f"{atom('s')}*{atom('s')}")
