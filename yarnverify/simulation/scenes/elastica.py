@@ -6,8 +6,8 @@ from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.fabric import bends, segments
 from yarnverify.simulation.quantities import choice, positive
 from yarnverify.simulation.scene import scene
-from yarnverify.simulation.setting import Known, Stage, Static
-from yarnverify.simulation.walls import clamped
+from yarnverify.simulation.setting import Stage, Static
+from yarnverify.simulation.walls import clamped, tip_answers
 
 
 @scene(
@@ -32,27 +32,6 @@ def elastica(
     loads = 0 * fabric.Q
     loads[fabric.position(size)[0, 2]] = -alpha * k_b / length**2
     tip = answers.elastica(alpha)
-    order, within = (2, 1e-4) if wall == "middle" else (1, 0.1)
-    stretched = alpha * k_b / length**2 / k_s
-    known = [
-        Known(
-            "deflection of the tip",
-            "m",
-            tip.deflection * length,
-            lambda end: -end.points[-1, 2],
-            order,
-            within,
-            floor=stretched,
-        ),
-        Known(
-            "place of the tip along",
-            "m",
-            tip.along * length,
-            lambda end: end.points[-1, 0],
-            order,
-            within,
-            floor=stretched,
-        ),
-    ]
+    known = tip_answers(tip, length, wall, within=1e-4, stretched=alpha * k_b / length**2 / k_s)
     active = fabric.positions(range(2, size + 1), "xz")
     return Static(fabric, terms, active, known, [Stage(loads)], colour="bending", view="front")

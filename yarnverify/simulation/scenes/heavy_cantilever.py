@@ -6,8 +6,8 @@ from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.fabric import bends, segments
 from yarnverify.simulation.quantities import choice, positive
 from yarnverify.simulation.scene import scene
-from yarnverify.simulation.setting import Known, Static
-from yarnverify.simulation.walls import clamped
+from yarnverify.simulation.setting import Static
+from yarnverify.simulation.walls import clamped, tip_answers
 
 
 @scene(
@@ -35,27 +35,6 @@ def heavy_cantilever(
         Term(gravity, segments(fabric, gravity), {"rho": rho, "g": (0, 0, -g)}),
     ]
     tip = answers.cantilever(rho * g * length**3 / k_b).tip
-    order, within = (2, 1e-3) if wall == "middle" else (1, 0.1)
-    stretched = rho * g * length / k_s
-    known = [
-        Known(
-            "deflection of the tip",
-            "m",
-            tip.deflection * length,
-            lambda end: -end.points[-1, 2],
-            order,
-            within,
-            floor=stretched,
-        ),
-        Known(
-            "place of the tip along",
-            "m",
-            tip.along * length,
-            lambda end: end.points[-1, 0],
-            order,
-            within,
-            floor=stretched,
-        ),
-    ]
+    known = tip_answers(tip, length, wall, within=1e-3, stretched=rho * g * length / k_s)
     active = fabric.positions(range(2, size + 1), "xz")
     return Static(fabric, terms, active, known, colour="bending", view="front")
