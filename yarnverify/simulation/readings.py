@@ -1,4 +1,4 @@
-"""What is read off a configuration: tensions and angles of segments."""
+"""What is read off a configuration: tensions and angles of segments; and the energy of a motion."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from yarnverify.simulation.setting import Outcome
 from yarnverify.simulation.tables import Table
 
 Array = NDArray[Any]
@@ -40,3 +41,8 @@ def deviations(Q: ArrayLike, table: Table) -> Array:
     q = np.asarray(Q, float)[table.rows]
     warp, weft = q[3:6] - q[:3], q[6:9] - q[:3]
     return np.arctan2((warp * weft).sum(axis=0), np.linalg.norm(np.cross(warp, weft, axis=0), axis=0))
+
+
+def energy_of_motion(at: Outcome) -> float:
+    """Kinetic and potential energy, J; nan of a problem at rest."""
+    return at.motion.energy if at.motion else np.nan

@@ -8,6 +8,7 @@ from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.dynamics import ORDERS, Scheme
 from yarnverify.simulation.fabric import segments, yarn
 from yarnverify.simulation.quantities import choice, positive, whole
+from yarnverify.simulation.readings import energy_of_motion
 from yarnverify.simulation.scene import scene
 from yarnverify.simulation.setting import Known, Moving
 
@@ -64,7 +65,7 @@ def axial_swing(
         ],
         scheme,
         start,
-        watch={"energy": lambda at: at.motion.energy if at.motion else np.nan},
+        watch={"energy": energy_of_motion},
         colour="stretch",
         view="front",
     )  # fmt: skip

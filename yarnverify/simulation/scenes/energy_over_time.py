@@ -7,6 +7,7 @@ from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.dynamics import ORDERS, Scheme
 from yarnverify.simulation.fabric import bends, segments, yarn
 from yarnverify.simulation.quantities import choice, positive, real, whole
+from yarnverify.simulation.readings import energy_of_motion
 from yarnverify.simulation.scene import scene
 from yarnverify.simulation.setting import Array, Known, Moving, Outcome
 
@@ -65,7 +66,7 @@ def energy_over_time(
         until / count,
         known,
         scheme,
-        watch={"energy": lambda at: at.motion.energy if at.motion else np.nan},
+        watch={"energy": energy_of_motion},
         colour="stretch",
         view="front",
     )

@@ -9,6 +9,7 @@ from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.dynamics import Scheme
 from yarnverify.simulation.fabric import bends, segments, shears, weave
 from yarnverify.simulation.quantities import choice, positive
+from yarnverify.simulation.readings import energy_of_motion
 from yarnverify.simulation.scene import scene
 from yarnverify.simulation.setting import Moving
 
@@ -55,5 +56,5 @@ def hung_cloth(
     mass = Term(kinetic, segments(cloth, kinetic), {"rho": rho})
     return Moving(
         cloth, terms, free, mass, until, h, scheme=scheme, start=start, options={"residual": 1e-7, "step": 1e-8},
-        watch={"energy": lambda at: at.motion.energy if at.motion else np.nan}, frames=60, view=((0.35, -1, 0.35), (0, 0, 1)),
+        watch={"energy": energy_of_motion}, frames=60, view=((0.35, -1, 0.35), (0, 0, 1)),
     )  # fmt: skip

@@ -9,6 +9,7 @@ from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.dynamics import Scheme
 from yarnverify.simulation.fabric import bends, contacts, segments, shears, weave
 from yarnverify.simulation.quantities import choice, positive, real, whole
+from yarnverify.simulation.readings import energy_of_motion
 from yarnverify.simulation.scene import scene
 from yarnverify.simulation.setting import Known, Moving
 
@@ -61,7 +62,7 @@ def rigid_motion(
         Known("greatest force in it", "N", 0.0, lambda end: np.abs(end.system.slope(start)).max(), within=strain, scale=k_s),
         Known("position", "m", cloth.points(start) + speed * until * direction, lambda end: end.points, within=1e-13,
               scale=max(extent, way)),
-        Known("energy", "J", moving, lambda end: end.motion.energy if end.motion else np.nan, within=1e-12,
+        Known("energy", "J", moving, energy_of_motion, within=1e-12,
               scale=moving or 1.0),
     ]  # fmt: skip
     mass = Term(kinetic, segments(cloth, kinetic), {"rho": rho})
