@@ -6,6 +6,7 @@ Where Newton's method on the residual finds no end, the minimum for inertia froz
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,12 +42,16 @@ class Frozen:
         """Coordinates of the nodes."""
         return self.increment.coordinates
 
+    @cached_property
+    def _known(self) -> Array:
+        """``P + a tau dT/dq(q*, v*)``, the same for every end, (size,)."""
+        step, guess = self.increment, self.guess
+        return step.momentum + step.a * step.tau * step.inertia.kinetic(step.at(guess), step.rate(guess)).slope
+
     def _inertial(self, Q: Array) -> tuple[float, Array]:
-        step = self.increment
-        q, v = step.at(self.guess), step.rate(Q)
-        known = step.momentum + step.a * step.tau * step.inertia.kinetic(q, step.rate(self.guess)).slope
-        found = step.inertia.kinetic(q, v)
-        return found.energy - float(np.add.reduce(known * v)), (found.momentum - known) / step.tau
+        step, v = self.increment, self.increment.rate(Q)
+        found = step.inertia.kinetic(step.at(self.guess), v)
+        return found.energy - float(np.add.reduce(self._known * v)), (found.momentum - self._known) / step.tau
 
     def energy(self, Q: Array) -> float:
         """The potential, J."""
