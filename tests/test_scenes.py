@@ -19,10 +19,6 @@ from yarnverify.simulation.study import study
 
 BY_NAME = {each.name: each for each in SCENES}
 AT_REST = [each for each in SCENES if each.validates and isinstance(each.problem(each.sizes[0]), Static)]
-STRETCHED = {
-    "shear angle of a quadrant",
-    "shear angle, mean of the central zone",
-}  # of bias extension: as yarns stretch
 CONDITIONED = {"load at which it buckles"}  # its Hessian loses size**4 units
 
 

@@ -81,11 +81,6 @@ class Quantity:
             raise InputError(f"{name} is {expected}; {text!r} has the unit {found[2]!r}")
         return number
 
-    def shown(self, value: Value) -> str:
-        """A value with its unit."""
-        text = f"{value:.10g}" if isinstance(value, float) else str(value)
-        return f"{text} {self.unit}".rstrip()
-
 
 def positive(default: float, unit: str, reason: str = "") -> Any:
     """A number above zero."""

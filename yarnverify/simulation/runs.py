@@ -75,9 +75,9 @@ class Run:
         self.start = start
         if isinstance(p, Moving):
             self._dynamics = Dynamics(p.fabric.Q, p.terms, p.active, p.kinetic, p.loads, scheme=p.scheme, held=p.held,
-                                      solver=None, **p.options)  # fmt: skip
+                                      **p.options)  # fmt: skip
             self.system = self._dynamics.system
-            self._dynamics.solver = self._linear(None)
+            self._dynamics.solver = self._linear()
         else:
             self.system = System(p.fabric.Q, p.terms, p.active)
         self._names = ["time", *p.watch]
@@ -110,8 +110,8 @@ class Run:
 
     # -- how
 
-    def _linear(self, default: Solver | None) -> Solver | None:
-        return SuperLU(self.system.nodes, self.system.coordinates) if self.solver == "superlu" else default
+    def _linear(self) -> Solver | None:
+        return SuperLU(self.system.nodes, self.system.coordinates) if self.solver == "superlu" else None
 
     def _watched(self, time: float, Q: Array, motion: Motion | None) -> list[float]:
         seen = Outcome(self.problem.fabric, Q, self.system, {}, motion)
@@ -124,7 +124,7 @@ class Run:
         Q = np.array(state["Q"], float) if state else self.start
         before = np.array(state["Q before"], float) if state else self.start
         rows = self._rows(state)
-        solver = self._linear(None)
+        solver = self._linear()
         options = {"residual": RESIDUAL, **p.options}
         for stage in p.stages[:done]:  # loads that a stage leaves are those of the one before
             self.system.loads = self.system.loads if stage.loads is None else np.array(stage.loads, float)

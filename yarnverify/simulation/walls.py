@@ -8,8 +8,6 @@ from yarnverify.simulation.cloth import Fabric
 from yarnverify.simulation.fabric import yarn
 from yarnverify.simulation.setting import Known
 
-HELD = (0, 1)  # the nodes of a clamp
-
 
 def clamped(length: float, segments: int, wall: str = "middle", R: float = 0.2e-3) -> Fabric:
     """A yarn along x from a wall at x = 0, held at its first two nodes.
