@@ -97,7 +97,7 @@ def study(
     problems = {
         (line.name, size): scene.problem(size, line.values) for line in lines for size in sizes
     }  # refuse before running
-    weights = {key: float(len(sizes) and key[1]) for key in problems}
+    total = sum(size for _, size in problems)
     shown = (lines[0].name, sizes[-1])
     drawn: Mapping[str, Any] = {}
     before, kept, timed = 0.0, [], []
@@ -105,7 +105,7 @@ def study(
         runs, seconds = [], []
         for size in sizes:
             key = (line.name, size)
-            share = weights[key] / sum(weights.values())
+            share = size / total
 
             def told(label: str, done: float, at: float = before, share: float = share, key: Any = key) -> None:
                 tell(f"{key[0]}, {key[1]}: {label}", at + share * done)
