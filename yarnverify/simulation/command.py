@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -16,7 +15,7 @@ from yarnverify.simulation.runs import Reached
 from yarnverify.simulation.scene import SOLVERS, Scene, suggestion
 from yarnverify.simulation.setting import Setting
 from yarnverify.simulation.study import Keeping, Study, Tell, study
-from yarnverify.simulation.view.files import whole
+from yarnverify.simulation.view.files import write_record
 
 
 def find(name: str) -> Scene:
@@ -220,8 +219,7 @@ class Files:
         """Write records and pictures; the lines to print."""
         lines = []
         for name, record in (("result", found.result), ("timings", found.timings)):
-            with whole(self.folder / f"{name}.json") as part:
-                part.write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+            write_record(record, self.folder / f"{name}.json")
         lines.append(f"{self.folder}: result.json, timings.json, {self.name}.pvd, states/")
         if pictures and importlib.util.find_spec("matplotlib") is None:
             lines.append("no pictures: they need the extra view: pip install 'yarnverify[view]'")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from yarnverify.machine import environment
 from yarnverify.simulation.frugality import frugality
 from yarnverify.simulation.scene import Scene
 from yarnverify.simulation.study import Study, Tell, study
-from yarnverify.simulation.view.files import whole
+from yarnverify.simulation.view.files import write_record
 
 COMMAND = "yarnverify simulate --write"
 ROUNDS = 2  # the shorter time of these counts: the first one meets cold memory
@@ -57,6 +56,5 @@ def _shortest(lines: Sequence[dict[str, Any]]) -> dict[str, Any]:
 def write(record: dict[str, Any], folder: Path) -> Path:
     """Write it below a folder of reports."""
     path = folder / "records" / "simulation.json"
-    with whole(path) as part:
-        part.write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_record(record, path)
     return path

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from yarnverify.errors import NotRunError
 
@@ -30,3 +32,9 @@ def whole(path: Path) -> Iterator[Path]:
         raise NotRunError(f"{path} cannot be written: {error.strerror or error}") from error
     finally:
         part.unlink(missing_ok=True)
+
+
+def write_record(record: Mapping[str, Any], path: Path) -> None:
+    """Write JSON data, whole or not at all."""
+    with whole(path) as part:
+        part.write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
