@@ -107,10 +107,11 @@ class Scene:
             raise InputError(
                 f"{self.name}: the size, {self.size}, must be a whole number, at least {self.least}; not {size!r}"
             )
+        values = self.values(given)
         try:
-            return self.build(size, **self.values(given))
+            return self.build(size, **values)
         except InputError as error:
-            raise InputError(f"{self.name}: {error}".replace(f"{self.name}: {self.name}: ", f"{self.name}: ")) from None
+            raise InputError(f"{self.name}: {error}") from None
         except (ElementError, ValueError, OverflowError, ZeroDivisionError) as error:
             raise InputError(f"{self.name} at size {size} cannot be built with these parameters: {error}") from None
 
