@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from yarnverify.simulation.assembly import System
 from yarnverify.simulation.dynamics import Dynamics, Motion
 from yarnverify.simulation.linear import Solver, SuperLU
-from yarnverify.simulation.newton import stages
+from yarnverify.simulation.newton import NotConverged, stages
 from yarnverify.simulation.setting import Moving, Outcome, Setting, Static
 
 Array = NDArray[Any]
 State = Mapping[str, Any]
+SHORTEST = 1e-6  # of its rest length in the fabric: a segment below it has drawn together
 RESIDUAL = 1e-15  # of the greatest force: to rounding, so that exact answers come out to their last digits
 
 
@@ -113,6 +114,19 @@ class Run:
     def _linear(self) -> Solver | None:
         return SuperLU(self.system.nodes, self.system.coordinates) if self.solver == "superlu" else None
 
+    def _check(self, Q: Array) -> None:
+        """Refuse an end at the border of the domain, where rounding makes any force."""
+        fabric = self.problem.fabric
+        first, second = (fabric.chain.slides[places] for places in fabric.chain.pairs)
+        share = (Q[second] - Q[first]) / (fabric.Q[second] - fabric.Q[first])
+        if share.size and not share.min() > SHORTEST:
+            at = int(np.argmin(share))
+            nodes = [int(fabric.chain.nodes[places[at]]) for places in fabric.chain.pairs]
+            reason = (
+                f"nodes {nodes[0]} and {nodes[1]} have drawn together: {share[at]:.0e} is left of the yarn between them"
+            )
+            raise NotConverged(reason, Q, [], None)
+
     def _watched(self, time: float, Q: Array, motion: Motion | None) -> list[float]:
         seen = Outcome(self.problem.fabric, Q, self.system, {}, motion)
         return [time, *(float(value(seen)) for value in self.problem.watch.values())]
@@ -135,6 +149,7 @@ class Run:
                 self.system, guess, [stage.loads], [stage.held], solver, report=self._tell(number), **options
             ):
                 before, Q, iterations = Q, found.Q, iterations + found.iterations
+                self._check(Q)
             rows.append(self._watched(number + 1.0, Q, None))
             own: Callable[[], State] = partial(
                 dict, {"Q": Q, "Q before": before, "stage": number + 1, "iterations": iterations}
@@ -162,6 +177,7 @@ class Run:
             if frame:
                 frames, times = [*frames, after.Q], [*times, after.time]
             motion = after
+            self._check(motion.Q)
             rows.append(self._watched(motion.time, motion.Q, motion))
             own = partial(_of_motion, motion, frames, times)
             yield Reached(motion.time, motion.Q, partial(self._saved, rows, len(rows), own), frame)

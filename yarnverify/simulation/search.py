@@ -91,6 +91,7 @@ class Search:
                     return Equilibrium(self.Q, value.energy, self.history, negative, self.departures, self.steps.seconds,
                                        value.gradient, left)  # fmt: skip
                 continue
+            rough = factor is None  # a step of the semi-definite form
             value, factor = value._replace(matrix=_NOTHING), None  # their memory goes before that of the next comes
             progress |= size < 0.5 * self._step
             self._step = min(size, self._step)
@@ -102,7 +103,7 @@ class Search:
                 self.searching -= 1
                 self._note(value, residual, self._searched(value, step), "search")
             else:
-                self._note(value, residual, self._full(value, step, size), "full")
+                self._note(value, residual, self._full(value, step, size, rough), "full")
         raise self._failed(f"no equilibrium after {len(self.history)} iterations")
 
     # -- the course of a search
@@ -168,15 +169,19 @@ class Search:
         except LinearSolveError as error:
             raise self._failed(str(error)) from error
 
-    def _full(self, value: Evaluation, step: Array, size: float) -> float:
-        """The full step, or a search where it leads out of the domain of an element."""
-        Q = self.steps.moved(self.Q, step)
+    def _full(self, value: Evaluation, step: Array, size: float, rough: bool) -> float:
+        """The full step, or a search where it leads out of the domain of an element; more of it where it is a rough one."""
+        Q, share = self.steps.moved(self.Q, step), 1.0
         try:
             self._next = self.steps.evaluate(Q)
         except ElementError:
             return self._searched(value, step)
+        if rough and self._next.energy < value.energy:
+            share = self.steps.stretched(self.Q, self._next.energy, step)
+        if share > 1:
+            Q, self._next = self.steps.moved(self.Q, step, share), None
         self.Q = Q
-        return size
+        return share * size
 
     def _searched(self, value: Evaluation, step: Array) -> float:
         self.Q, length = self.steps.line_search(self.Q, value, step)

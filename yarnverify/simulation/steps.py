@@ -106,6 +106,20 @@ class Steps:
             share /= 2
         return Q, 0.0  # there is nothing to be gained in this direction
 
+    def stretched(self, Q: Array, energy: float, step: Array) -> float:
+        """How much of a step to make, by doubling as long as the energy falls below that at its end.
+
+        A semi-definite form is as stiff as ever where the Hessian is hardly negative, so that its steps away from a saddle
+        are far too short.
+        """
+        share, longest = 1.0, float(np.ptp(Q))
+        while 2 * share * float(np.abs(step).max()) < longest:
+            further = self.energy(self.moved(Q, step, 2 * share))
+            if not further < energy:
+                break
+            share, energy = 2 * share, further
+        return share
+
     def beside(self, Q: Array, value: Evaluation, factor: Factor | None) -> tuple[Array | None, int | None]:
         """A state of lower energy beside an unstable equilibrium, and else the number of negative eigenvalues."""
         if not value.gradient.size:
