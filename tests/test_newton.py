@@ -168,7 +168,7 @@ def test_a_step_that_leaves_a_saddle_grows_as_long_as_the_energy_falls() -> None
     aside = np.zeros(thread.size)
     aside[thread.positions(range(1, 20)).reshape(-1, 3)[:, 1]] = np.sin(np.pi * np.arange(1, 20) / 20)
     short = 1e-6 * aside[system.active]
-    steps = Steps(system)
+    steps = Steps(system, system.direct)
     share = steps.stretched(Q, system.energy(Q + 1e-6 * aside), short)
     assert np.log2(share) % 1 == 0 and 1e-6 * share > 0.03  # 2/pi sqrt(0.01) = 0.064 takes up all that it is too long
     along = [system.energy(Q + 1e-6 * 2.0**k * aside) for k in range(int(np.log2(share)) + 2)]

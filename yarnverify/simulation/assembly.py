@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from yarnverify.simulation.calls import Calls
+from yarnverify.simulation.linear import Direct
 from yarnverify.simulation.owners import owners
 from yarnverify.simulation.pattern import Elements, Pattern, zeros
 from yarnverify.simulation.problem import Evaluation, Worst
@@ -84,6 +85,7 @@ class System:
         self._forms: list[Form] = [form_of(t.kernel) if definite == "quick" else eigenvalues for t in self.terms]
         self.calls = Calls(self.engine)
         self.nodes, self.coordinates = owners(np.asarray(Q, float), self.active, tables)
+        self.direct = Direct(self.nodes, self.coordinates)
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -165,7 +167,7 @@ class System:
             force = max(force, float(most), -float(least))
             self.scatter.entries(slope, term.table.rows[:, part], g)
             if packed is not None:
-                self.scatter.blocks(sums, places, part, packed, places.pairs)
+                self.scatter.blocks(sums, places, part, packed, places.rows)
             self.seconds["assembly"] += self.clock() - start
         start = self.clock()
         matrix = self.pattern.matrix(sums)

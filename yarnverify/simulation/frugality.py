@@ -134,14 +134,12 @@ def _spent(setting: Setting, iterations: float = np.inf) -> tuple[dict[str, Any]
 
 def _memory(setting: Setting) -> int:
     """Greatest memory of making the system, evaluating it and factorising its Hessian, bytes."""
-    from yarnverify.simulation.newton import solver_for
-
     tracemalloc.start()
     try:
         run = Run(setting)
         matrix = run.system.evaluate(run.start, True).matrix
         with suppress(LinearSolveError):  # a singular one takes the same memory
-            solver_for(run.system, matrix).factorise(matrix)
+            run.system.direct.factorise(matrix)
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

@@ -50,6 +50,11 @@ class Places:
     straight: Array
     transposed: Array
 
+    @cached_property
+    def rows(self) -> Array:
+        """Row of the packed Hessian of each entry, in the order in which they are summed, (k,)."""
+        return self.pairs[self.which]
+
     def turn(self, values: Array, part: slice) -> None:
         """Change the sign of entries (k, m) of a skew matrix where their block is summed transposed."""
         if self.turned.size:
@@ -190,6 +195,8 @@ class Pattern:
         return np.concatenate(places), np.concatenate(values)
 
     def _entries(self, sums: Array) -> Array:
+        if self._source.size <= TAKEN:
+            return sums.take(self._source, mode="clip")
         found = np.empty(self._source.size)
         for start in range(0, found.size, TAKEN):  # all at once, NumPy would copy the indices to twice their size
             part = slice(start, start + TAKEN)

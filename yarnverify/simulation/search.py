@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -22,9 +23,9 @@ from yarnverify.simulation.linear import Factor, LinearSolveError
 from yarnverify.simulation.linear.threads import one_thread
 from yarnverify.simulation.outcome import Equilibrium, Iteration, Kind, NotConverged, Options
 from yarnverify.simulation.problem import Evaluation
-from yarnverify.simulation.steps import Steps, solver_for
+from yarnverify.simulation.steps import Steps
 
-__all__ = ["EPSILON", "Equilibrium", "Iteration", "NotConverged", "Options", "Search", "solver_for"]
+__all__ = ["EPSILON", "Equilibrium", "Iteration", "NotConverged", "Options", "Search"]
 
 Array = NDArray[Any]
 EPSILON = float(np.finfo(float).eps)
@@ -72,6 +73,8 @@ class Search:
             progress = self._remember(value)
             factor, step = None, np.zeros(0)
             residual = size = greatest(value.gradient)
+            if not isfinite(residual):
+                raise NotConverged("the gradient is not finite", self._lowest, self.history, None)
             rest = residual <= self.options.residual * value.force
             if not rest:
                 factor, step = self._direction(value)
@@ -137,7 +140,7 @@ class Search:
 
     def _explained(self, value: Evaluation, residual: float, size: float) -> bool:
         """Whether the coordinates cannot be told any better: the step or the residual is what rounding them makes of it."""
-        extent = float(np.ptp(self.Q))
+        extent = float(np.maximum.reduce(self.Q) - np.minimum.reduce(self.Q))
         if size <= self.options.step * extent:
             return True
         if size > 1e-7 * extent:
@@ -159,8 +162,6 @@ class Search:
             if not self.history:
                 raise
             raise NotConverged(f"the search led to where {error}", self._lowest, self.history, None) from error
-        if not np.isfinite(value.gradient).all():
-            raise NotConverged("the gradient is not finite", self._lowest, self.history, None)
         return value
 
     def _direction(self, value: Evaluation) -> tuple[Factor | None, Array]:
