@@ -84,6 +84,8 @@ class System:
         self.scatter: Scatter = Loops() if self.engine == "compiled" else Arrays()
         self._forms: list[Form] = [form_of(t.kernel) if definite == "quick" else eigenvalues for t in self.terms]
         self.calls = Calls(self.engine)
+        for term in self.terms:
+            self.calls.reserve(term)
         self.nodes, self.coordinates = owners(np.asarray(Q, float), self.active, tables)
         self.direct = Direct(self.nodes, self.coordinates)
 
@@ -171,8 +173,10 @@ class System:
             self.seconds["assembly"] += self.clock() - start
         start = self.clock()
         matrix = self.pattern.matrix(sums)
+        del sums
+        slope -= self.loads
         self.seconds["assembly"] += self.clock() - start
-        return Evaluation(total, (slope - self.loads)[self.active], matrix, force)
+        return Evaluation(total, slope[self.active], matrix, force)
 
     def worst(self, Q: Array) -> Worst | None:
         """The element that contributes most to the greatest entry of the gradient."""

@@ -12,7 +12,7 @@ from scipy import sparse
 from yarnverify.kernels.batch import upper
 from yarnverify.simulation.assembly import System, Term
 from yarnverify.simulation.calls import CHUNK
-from yarnverify.simulation.pattern import Elements, zeros
+from yarnverify.simulation.pattern import TAKEN, Elements, zeros
 
 Array = NDArray[Any]
 
@@ -58,6 +58,7 @@ class Inertia:
         self._slides = rows[slides]
         self._sliding = bool((system.pattern.local[self._slides] >= 0).any())
         self._key = b""
+        system.calls.reserve(term)
 
     @cached_property
     def _number(self) -> dict[tuple[int, int], int]:
@@ -149,7 +150,9 @@ class Inertia:
     def add_mass(self, matrix: sparse.csc_array, factor: float) -> None:
         """Add the constant mass matrix to one of the system's pattern, in place."""
         at, values = self._active_mass
-        matrix.data[at] += factor * values
+        for start in range(0, at.size, TAKEN):  # all at once, NumPy would take twice their memory
+            part = slice(start, start + TAKEN)
+            matrix.data[at[part]] += factor * values[part]
 
     @cached_property
     def _active_mass(self) -> tuple[Array, Array]:

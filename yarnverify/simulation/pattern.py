@@ -186,13 +186,15 @@ class Pattern:
 
     def nonzero(self, sums: Array) -> tuple[Array, Array]:
         """Places and values of the entries of the matrix that are not zero."""
-        places, values = [np.empty(0, self.indptr.dtype)], [np.empty(0)]
-        for start in range(0, self._source.size, TAKEN):
-            entries = sums.take(self._source[start : start + TAKEN])
+        parts = [slice(start, start + TAKEN) for start in range(0, self._source.size, TAKEN)]
+        count = sum(int(np.count_nonzero(sums.take(self._source[part]))) for part in parts)
+        places, values, done = np.empty(count, self.indptr.dtype), np.empty(count), 0
+        for part in parts:
+            entries = sums.take(self._source[part])
             at = np.flatnonzero(entries)
-            places.append((start + at).astype(self.indptr.dtype))
-            values.append(entries[at])
-        return np.concatenate(places), np.concatenate(values)
+            here = slice(done, done + at.size)
+            places[here], values[here], done = part.start + at, entries[at], here.stop
+        return places, values
 
     def _entries(self, sums: Array) -> Array:
         if self._source.size <= TAKEN:

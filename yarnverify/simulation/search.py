@@ -63,7 +63,7 @@ class Search:
     @one_thread()
     def run(self) -> Equilibrium:
         """Iterate to the end."""
-        self._lowest, self._lowest_energy = self.Q.copy(), np.inf
+        self._lowest, self._lowest_energy = self.Q, np.inf  # no configuration is changed in place
         self._start_again(self.Q, self.searching)
         ceiling, first = np.inf, True  # energy that the end must not exceed
         while len(self.history) < self.options.iterations and self._left >= 0:
@@ -112,7 +112,7 @@ class Search:
     # -- the course of a search
 
     def _start_again(self, Q: Array, searches: int) -> None:
-        self.Q, self._next = Q.copy(), None
+        self.Q, self._next = Q, None
         self._energy, self._step, self._stale, self._fulls = np.inf, np.inf, 0, 0
         self._residual, self.searching = np.inf, searches
 
@@ -126,7 +126,7 @@ class Search:
     def _remember(self, value: Evaluation) -> bool:
         """Keep the best state; whether the energy has decreased since the last start."""
         if value.energy < self._lowest_energy:
-            self._lowest, self._lowest_energy = self.Q.copy(), value.energy
+            self._lowest, self._lowest_energy = self.Q, value.energy
         if not value.energy < self._energy:
             return False
         self._energy = value.energy
