@@ -23,9 +23,9 @@ from yarnverify.kernels import ElementError
 from yarnverify.simulation.assembly import System, Term
 from yarnverify.simulation.increment import Increment
 from yarnverify.simulation.inertia import Inertia, elements_of
-from yarnverify.simulation.linear import LinearSolveError, Solver, SuperLU
+from yarnverify.simulation.linear import Solver, SuperLU
 from yarnverify.simulation.newton import minimise
-from yarnverify.simulation.search import NotConverged
+from yarnverify.simulation.outcome import UNSOLVED, NotConverged
 
 Array = NDArray[Any]
 Scheme = Literal["implicit_euler", "midpoint", "bdf2"]
@@ -163,7 +163,7 @@ class Dynamics:
             found = self.inertia.kinetic(q, v)
             force = found.slope - self.system.slope(q)
             potential = self.system.energy(q)
-        except (NotConverged, ElementError, LinearSolveError) as error:
+        except UNSOLVED as error:
             reason = f"the step of {h:.6g} s from time {motion.time:.6g} s has no end, a shorter one may have: "
             if isinstance(error, NotConverged):
                 raise NotConverged(reason + error.reason, error.Q, error.history, error.worst) from error

@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from yarnverify.kernels import ElementError, bending, gravity, parallel_contact, shear, stretch
+from yarnverify.kernels import bending, gravity, parallel_contact, shear, stretch
 from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.fabric import bends, contacts, segments, shears
 from yarnverify.simulation.linear import LinearSolveError
+from yarnverify.simulation.outcome import UNSOLVED
 from yarnverify.simulation.runs import Run
-from yarnverify.simulation.search import NotConverged
 from yarnverify.simulation.setting import Known, Outcome, Setting, Static
 
 # what a scene does not say of its yarns is that of cotton: Y pi R^2 and EI with Y = 0.4 GPa and E = 0.8 GPa at R = 0.2 mm, a
@@ -112,7 +112,7 @@ def _ended(run: Run, iterations: float) -> tuple[Outcome | None, str, int]:
             reached, made = at, made + run.moving
     except _Enough:
         made, trouble = made - 1, f"no equilibrium after {iterations} iterations"
-    except (NotConverged, ElementError, LinearSolveError) as error:
+    except UNSOLVED as error:
         trouble = str(error).split(";")[0].split(": ")[0]
     return None if trouble or reached is None else run.outcome(reached.arrays()), trouble, made
 

@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.kernels import ElementError
 from yarnverify.simulation.assembly import System
-from yarnverify.simulation.linear import LinearSolveError, Solver
-from yarnverify.simulation.outcome import Equilibrium, Iteration, NotConverged, Options
+from yarnverify.simulation.linear import Solver
+from yarnverify.simulation.outcome import UNSOLVED, Equilibrium, Iteration, NotConverged, Options
 from yarnverify.simulation.problem import Problem
 from yarnverify.simulation.search import Search
 from yarnverify.simulation.steps import Steps
@@ -127,7 +126,7 @@ def stages(
             start = np.where(fixed, Q_after if now == 1 else Q_before + now * (Q_after - Q_before), Q)
             try:
                 found = minimise(system, start, solver, **options)
-            except (NotConverged, ElementError, LinearSolveError):
+            except UNSOLVED:
                 size /= 2
                 if size < 0.5**halvings:
                     system.loads = load_before + done * (load_after - load_before)
