@@ -116,16 +116,17 @@ class Run:
 
     def _check(self, Q: Array) -> None:
         """Refuse an end at the border of the domain, where rounding makes any force."""
-        fabric = self.problem.fabric
-        first, second = (fabric.chain.slides[places] for places in fabric.chain.pairs)
-        share = (Q[second] - Q[first]) / (fabric.Q[second] - fabric.Q[first])
-        if share.size and not share.min() > SHORTEST:
-            at = int(np.argmin(share))
-            nodes = [int(fabric.chain.nodes[places[at]]) for places in fabric.chain.pairs]
-            reason = (
-                f"nodes {nodes[0]} and {nodes[1]} have drawn together: {share[at]:.0e} is left of the yarn between them"
-            )
-            raise NotConverged(reason, Q, [], None)
+        for term in self.problem.terms:
+            if term.kernel.KERNEL.name != "stretch":
+                continue
+            first, second = (term.table.rows[term.kernel.DOFS.index(label)] for label in ("u0", "u1"))
+            share = (Q[second] - Q[first]) / (self.problem.fabric.Q[second] - self.problem.fabric.Q[first])
+            if share.size and not share.min() > SHORTEST:
+                at = int(np.argmin(share))
+                reason = (
+                    f"{term.name} {at}: its ends have drawn together, {share[at]:.0e} is left of the yarn between them"
+                )
+                raise NotConverged(reason, Q, [], None)
 
     def _watched(self, time: float, Q: Array, motion: Motion | None) -> list[float]:
         seen = Outcome(self.problem.fabric, Q, self.system, {}, motion)

@@ -143,7 +143,7 @@ class Search:
         extent = float(np.maximum.reduce(self.Q) - np.minimum.reduce(self.Q))
         if size <= self.options.step * extent:
             return True
-        if size > 1e-7 * extent:
+        if size > 1e-7 * extent and self._stale < 2:  # a soft direction may go to and fro with rounding for ever
             return False
         found = np.abs(value.gradient)
         before, self._residual = self._residual, residual
