@@ -123,10 +123,8 @@ class Run:
             share = (Q[second] - Q[first]) / (self.problem.fabric.Q[second] - self.problem.fabric.Q[first])
             if share.size and not share.min() > SHORTEST:
                 at = int(np.argmin(share))
-                reason = (
-                    f"{term.name} {at}: its ends have drawn together, {share[at]:.0e} is left of the yarn between them"
-                )
-                raise NotConverged(reason, Q, [], None)
+                left = f"{share[at]:.0e} of the yarn between them is left"
+                raise NotConverged(f"the ends of {term.name} {at} have drawn together; {left}", Q, [], None)
 
     def _watched(self, time: float, Q: Array, motion: Motion | None) -> list[float]:
         seen = Outcome(self.problem.fabric, Q, self.system, {}, motion)
