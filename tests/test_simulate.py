@@ -200,6 +200,7 @@ def test_another_run_is_not_gone_on_with(tmp_path: Path, swing: Path) -> None:
         (["raising.py"], 2, "raising.py:2:1: ZeroDivisionError: division by zero"),
         (["empty.py"], 2, "empty.py must declare one scene, a function under @scene(...); it declares 0"),
         (["elastica", "--set", "alpha=1e9"], 2, "alpha = P L^2/EI must be positive and at most 100000"),
+        (["elastica", "--size", "999999999999999"], 3, "yarnverify: this needs more memory than there is: Unable to allocate"),
         (["bias_extension", "--set", "strain=2"], 2, "the cloth cannot be deformed so far"),
     ],
 )  # fmt: skip
@@ -216,6 +217,11 @@ def test_one_clear_error(
     shown = capsys.readouterr()
     assert ended.value.code == status and message in shown.err, shown.err
     assert shown.err.count("\n") == 1 and not shown.out
+
+
+def test_yarns_too_stiff_for_their_coordinates_are_refused() -> None:
+    with pytest.raises(InputError, match=r"k_s = 1e\+12 N is 3e\+18 times k_b .*; at most 4.*e\+09 N"):
+        run("elastica", sizes=(160,), given=("k_s=1e12",))
 
 
 def test_missed_goals_are_exit_status_1(
