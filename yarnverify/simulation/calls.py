@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from yarnverify.kernels import ElementError
 from yarnverify.kernels.batch import Batch
 from yarnverify.kernels.inputs import Engine
+from yarnverify.kernels.memory import aligned
 from yarnverify.simulation.pattern import Places
 from yarnverify.simulation.semidefinite import Form
 from yarnverify.simulation.terms import Term
@@ -60,7 +61,7 @@ class Calls:
         """Memory for energy, gradient, packed Hessian and rows of a chunk."""
         if (dof, n) not in self._memory:
             shapes = [(n,), (dof, n), (dof * (dof + 1) // 2, n), (dof, n)]
-            self._memory[dof, n] = [np.empty(shape) for shape in shapes]
+            self._memory[dof, n] = [aligned(shape, float) for shape in shapes]
         return self._memory[dof, n]
 
     def run(self, term: Term, wanted: str, q: Array, part: Any, fresh: bool = False) -> list[Array]:
