@@ -83,7 +83,7 @@ def ended(name: str, size: int, values: dict[str, Any]) -> tuple[Any, Outcome]:
 
 
 def test_a_hung_cloth_hangs_below_its_corners() -> None:
-    problem, end = ended("hung_cloth", 6, {"until": 0.2, "h": 0.01})
+    problem, end = ended("hung_cloth", 6, {"until": 0.2, "h": 0.01, "tilt": 1.5})
     cloth, start = problem.fabric, problem.fabric.points(problem.start)
     corners = [cloth.node(0, -1), cloth.node(-1, -1)]
     assert (end.points[corners] == start[corners]).all()
@@ -95,8 +95,17 @@ def test_a_hung_cloth_hangs_below_its_corners() -> None:
     assert energy[-1] < energy[0]
 
 
+def test_the_edge_between_the_corners_of_a_hung_cloth_is_a_swag() -> None:
+    problem, end = ended("hung_cloth", 13, {"until": 0.6})
+    cloth = problem.fabric
+    edge = end.points[[cloth.node(i, -1) for i in range(13)]]
+    assert edge[6, 2] < edge[0, 2] - 1.2 * cloth.L and (np.diff(edge[4:9, 2], 2) > 0).all()  # it sags as a chain does
+    middle = end.points[[cloth.node(i, 6) for i in range(13)], 1]
+    assert np.ptp(middle) > 2 * cloth.L  # and the cloth below is folded
+
+
 def test_a_draped_cloth_lies_on_the_sphere() -> None:
-    problem, end = ended("draped_cloth", 9, {"until": 0.2, "radius": 6e-3})
+    problem, end = ended("draped_cloth", 9, {"until": 0.2, "radius": 12e-3})
     cloth, (ball,) = problem.fabric, problem.solids
     away = np.linalg.norm(end.points, axis=1) - ball.radius
     assert away.min() > 1.5 * cloth.R  # no yarn is drawn inside

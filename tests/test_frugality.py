@@ -48,11 +48,23 @@ def test_costs_and_how_far_answers_move() -> None:
     assert max(move["by"] for move in found["all energies"]["moved"]) < 1e-12
 
 
-def test_a_scene_that_does_not_end_with_everything_is_said_to(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("yarnverify.simulation.frugality.LEAST", 0.0)
-    monkeypatch.setattr("yarnverify.simulation.frugality.PATIENCE", 0.0)
-    found, _ = frugality(find("catenary").problem(4), 4)
-    assert found["all energies"]["trouble"].startswith("given up") and found["all energies"]["moved"] == []
+def test_a_scene_without_an_answer_says_why_whatever_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = find("elastica").problem(6)
+    monkeypatch.setattr("yarnverify.simulation.frugality.ITERATIONS", 40)
+    found, timed = frugality(scene, 6)
+    own, other = found["own"], found["all energies, all sliding"]
+    assert not own["trouble"] and other["trouble"] == "no equilibrium after 40 iterations"
+    assert other["iterations"] == 40 and other["moved"] == []
+    assert 0 < other["falling"] < other["unknowns"]
+    assert timed["all energies, all sliding"]["seconds an iteration"] > 0
+    assert frugality(scene, 6)[0] == found  # the same each time
+
+
+def test_an_answer_that_is_one_with_everything_too_is_found_from_itself() -> None:
+    found, _ = frugality(find("hanging_yarn").problem(4), 4)
+    other = found["all energies, all sliding"]  # from the start nodes slide along the yarn until two meet
+    assert "drawn together" in other["trouble"] and other["falling"] == 0
+    assert max(move["by"] for move in other["moved"]) < 1e-12
 
 
 def test_the_record_of_a_scene_and_its_page(tmp_path: Path) -> None:

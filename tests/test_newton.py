@@ -14,6 +14,7 @@ from yarnverify.simulation.assembly import System
 from yarnverify.simulation.fabric import Fabric, bends, segments, weave, yarn
 from yarnverify.simulation.linear import LinearSolveError
 from yarnverify.simulation.newton import NotConverged, minimise, stages
+from yarnverify.simulation.steps import Steps
 from yarnverify.simulation.terms import Term
 
 Array = np.ndarray[Any, Any]
@@ -156,6 +157,23 @@ def test_a_strut_far_beyond_buckling_is_found_from_a_rough_start() -> None:
     assert found.negative == 0 and found.iterations <= 100
     tip = thread.points(found.Q)[-1]
     assert tip[1] < -0.1 and abs(tip[2]) < 1e-6  # on the side that the small load chooses
+
+
+def test_a_step_that_leaves_a_saddle_grows_as_long_as_the_energy_falls() -> None:
+    thread = yarn(1.0, 20)
+    terms = [Term(stretch, segments(thread), {"k_s": 1e4}), Term(bending, bends(thread), {"k_b": 1.0})]
+    system = System(thread.Q, terms, thread.positions(range(1, 20)))
+    Q = thread.Q.copy()
+    thread.points(Q)[:, 0] *= 0.99  # pressed ten times beyond its load, and straight
+    aside = np.zeros(thread.size)
+    aside[thread.positions(range(1, 20)).reshape(-1, 3)[:, 1]] = np.sin(np.pi * np.arange(1, 20) / 20)
+    short = 1e-6 * aside[system.active]
+    steps = Steps(system, system.direct)
+    share = steps.stretched(Q, system.energy(Q + 1e-6 * aside), short)
+    assert np.log2(share) % 1 == 0 and 1e-6 * share > 0.03  # 2/pi sqrt(0.01) = 0.064 takes up all that it is too long
+    along = [system.energy(Q + 1e-6 * 2.0**k * aside) for k in range(int(np.log2(share)) + 2)]
+    assert (np.diff(along[:-1]) < 0).all() and along[-1] >= along[-2]
+    assert steps.stretched(Q, -np.inf, short) == 1
 
 
 def test_stages_end_where_the_whole_load_does() -> None:

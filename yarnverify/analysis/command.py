@@ -175,12 +175,10 @@ def scene_modes(
     NotRunError
         A scene or modes that cannot be solved.
     """
-    from yarnverify.kernels import ElementError
     from yarnverify.simulation.command import find
     from yarnverify.simulation.command import settings as named
-    from yarnverify.simulation.linear import LinearSolveError
+    from yarnverify.simulation.outcome import UNSOLVED
     from yarnverify.simulation.runs import Run
-    from yarnverify.simulation.search import NotConverged
 
     scene = find(name)
     given = named(settings)
@@ -193,7 +191,7 @@ def scene_modes(
         for reached in run.go():
             state = reached.arrays
             advance(name, max(1, int(run.length)))
-    except (NotConverged, ElementError, LinearSolveError) as error:
+    except UNSOLVED as error:
         raise NotRunError(f"{name}: {error}") from None
     end = run.outcome(state())
     density = float(values.get("rho", rho))

@@ -88,27 +88,39 @@ def frugality(record: Mapping[str, Any]) -> Table | None:
         "Energies that a scene does not name are those of cotton yarn, weight without gravity; walls and other constraints "
         "are the scene's. Time is that of the whole solution, memory that of the system with its factorised Hessian, both as "
         "multiples of the scene as it is; answers move relative to their size.",
-        "A yarn that nothing crosses slides through its nodes for nothing: with all sliding coordinates its Hessian is "
-        "singular, and there is no one answer to find.",
+        "Where sliding is everywhere and nothing holds it, many a scene has no answer. A yarn that nothing crosses slides "
+        "through its nodes: straight, it does so for nothing; bent, two nodes that draw together share a turn, each with the "
+        "long segment beside it, for half the energy, and the energy falls until segments have no length. The directions in "
+        "which it falls, or stays, are counted at the scene's own answer. Where a second search, from there, found an "
+        "equilibrium, answers are compared with it.",
     ))  # fmt: skip
 
 
 def _spent(own: Mapping[str, Any], time: Mapping[str, Any], base: Mapping[str, Any]) -> tuple[str, str]:
     if time is base:
         return _time(time["seconds"]), f"{time['bytes'] / 1e6:.2g} MB"
-    longer = _number(time["seconds"] / base["seconds"], "times")
-    return (f"stopped at {longer}" if own["trouble"] else longer), _number(time["bytes"] / base["bytes"], "times")
+    memory = _number(time["bytes"] / base["bytes"], "times")
+    if not own["trouble"]:
+        return _number(time["seconds"] / base["seconds"], "times"), memory
+    each = time["seconds an iteration"], base["seconds an iteration"]
+    return (f"{_number(each[0] / each[1], 'times')} an iteration" if all(each) else ""), memory
 
 
 def _moved(own: Mapping[str, Any], way: str) -> str:
     if way == "own":
         return ""
-    if own["trouble"]:
-        return f"not solved: {own['trouble']}"
     most = [_size(move["by"]) for move in own["moved"]]
+    moves = ", ".join(f"{move['name']} {size}" for move, size in zip(own["moved"], most, strict=True))
     if len(set(most)) == 1:
-        return most[0]
-    return ", ".join(f"{move['name']} {size}" for move, size in zip(own["moved"], most, strict=True))
+        moves = most[0]
+    if not own["trouble"]:
+        return moves
+    if moves:
+        return f"{own['trouble']}; from the scene's own answer: {moves}"
+    where = (
+        f"; of {own['unknowns']} directions {own['falling']} fall and {own['flat']} stay" if "falling" in own else ""
+    )
+    return f"no answer: {own['trouble']}{where}"
 
 
 def _size(by: float | None) -> str:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from yarnverify.simulation.calls import Calls
+from yarnverify.simulation.linear import Direct
 from yarnverify.simulation.owners import owners
 from yarnverify.simulation.pattern import Elements, Pattern, zeros
 from yarnverify.simulation.problem import Evaluation, Worst
@@ -83,7 +84,10 @@ class System:
         self.scatter: Scatter = Loops() if self.engine == "compiled" else Arrays()
         self._forms: list[Form] = [form_of(t.kernel) if definite == "quick" else eigenvalues for t in self.terms]
         self.calls = Calls(self.engine)
+        for term in self.terms:
+            self.calls.reserve(term)
         self.nodes, self.coordinates = owners(np.asarray(Q, float), self.active, tables)
+        self.direct = Direct(self.nodes, self.coordinates)
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -165,12 +169,14 @@ class System:
             force = max(force, float(most), -float(least))
             self.scatter.entries(slope, term.table.rows[:, part], g)
             if packed is not None:
-                self.scatter.blocks(sums, places, part, packed, places.pairs)
+                self.scatter.blocks(sums, places, part, packed, places.rows)
             self.seconds["assembly"] += self.clock() - start
         start = self.clock()
         matrix = self.pattern.matrix(sums)
+        del sums
+        slope -= self.loads
         self.seconds["assembly"] += self.clock() - start
-        return Evaluation(total, (slope - self.loads)[self.active], matrix, force)
+        return Evaluation(total, slope[self.active], matrix, force)
 
     def worst(self, Q: Array) -> Worst | None:
         """The element that contributes most to the greatest entry of the gradient."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from yarnverify.simulation.assembly import System
 from yarnverify.simulation.linear import LinearSolveError
-from yarnverify.simulation.newton import minimise, solver_for
+from yarnverify.simulation.newton import minimise
 
 Array = NDArray[Any]
 
@@ -41,7 +41,7 @@ def critical(system: System, Q: Array, load: Array, most: float) -> float:
         pushed.loads = factor * load
         matrix = pushed.hessian(minimise(pushed, Q, stable=False, residual=1e-15).Q)
         try:
-            return bool(solver_for(pushed, matrix).factorise(matrix).negative)
+            return bool(pushed.direct.factorise(matrix).negative)
         except LinearSolveError as error:
             return error.direction is not None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from time import perf_counter
 from typing import Any
 
@@ -39,30 +40,47 @@ class Calls:
     engine: Engine
     clock: Callable[[], float] = perf_counter
     seconds: dict[str, float] = field(default_factory=lambda: {"kernels": 0.0, "assembly": 0.0})
+    _needed: int = 0
+    _room: Array = field(default_factory=lambda: np.empty(0))
     _memory: dict[tuple[int, int], list[Array]] = field(default_factory=dict)
-    _batches: dict[tuple[int, str], tuple[Term, Batch]] = field(
-        default_factory=dict
-    )  # with its term, whose id it keeps
+    # with their terms, whose ids they keep
+    _chunks: dict[int, tuple[Term, list[tuple[slice, Array, Array]]]] = field(default_factory=dict)
+    _batches: dict[tuple[int, str], tuple[Term, Batch]] = field(default_factory=dict)
 
     def chunks(self, terms: Sequence[Term], Q: Array) -> Iterator[tuple[Term, int, slice, Array]]:
         """Term, its number, a range of its elements, and what they read of a configuration (dofs, m)."""
         for number, term in enumerate(terms):
-            n = term.table.count
-            for start in range(0, n, CHUNK):
-                part = slice(start, min(start + CHUNK, n))
-                rows = term.table.rows[:, part]
-                q = self.memory(rows.shape[0], rows.shape[1])[3]
+            for part, rows, q in self._parts(term):
                 before = self.clock()
-                np.take(Q, rows, out=q, mode="clip")
+                Q.take(rows, out=q, mode="clip")
                 self.seconds["assembly"] += self.clock() - before
                 yield term, number, part, q
 
+    def _parts(self, term: Term) -> list[tuple[slice, Array, Array]]:
+        """Each chunk of a term's elements: their range, the rows of Q that they read, and the memory to read into."""
+        if id(term) not in self._chunks:
+            made = []
+            for start in range(0, term.table.count, CHUNK):
+                part = slice(start, min(start + CHUNK, term.table.count))
+                rows = term.table.rows[:, part]
+                made.append((part, rows, self.memory(*rows.shape)[3]))
+            self._chunks[id(term)] = term, made
+        return self._chunks[id(term)][1]
+
     def memory(self, dof: int, n: int) -> list[Array]:
-        """Memory for energy, gradient, packed Hessian and rows of a chunk."""
+        """Memory for energy, gradient, packed Hessian and rows of a chunk: the same for all chunks, one at a time."""
         if (dof, n) not in self._memory:
-            shapes = [(n,), (dof, n), (dof * (dof + 1) // 2, n), (dof, n)]
-            self._memory[dof, n] = [aligned(shape, float) for shape in shapes]
+            heights = np.cumsum([0, 1, dof, dof * (dof + 1) // 2, dof])
+            if heights[-1] * n > self._room.size:
+                self._room = aligned((max(int(heights[-1]) * n, self._needed),), float)
+            energy, *others = (self._room[a * n : b * n].reshape(b - a, n) for a, b in pairwise(heights.tolist()))
+            self._memory[dof, n] = [energy[0], *others]
         return self._memory[dof, n]
+
+    def reserve(self, term: Term) -> None:
+        """Have room for a term's chunks when memory is first asked for."""
+        dof = len(term.kernel.DOFS)
+        self._needed = max(self._needed, (1 + 2 * dof + dof * (dof + 1) // 2) * min(term.table.count, CHUNK))
 
     def run(self, term: Term, wanted: str, q: Array, part: Any, fresh: bool = False) -> list[Array]:
         """Outputs (``E``, ``G``, ``H`` as wanted) of some elements, in memory of their own if fresh.

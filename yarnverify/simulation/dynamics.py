@@ -23,9 +23,9 @@ from yarnverify.kernels import ElementError
 from yarnverify.simulation.assembly import System, Term
 from yarnverify.simulation.increment import Increment
 from yarnverify.simulation.inertia import Inertia, elements_of
-from yarnverify.simulation.linear import LinearSolveError, Solver, SuperLU
+from yarnverify.simulation.linear import Solver, SuperLU
 from yarnverify.simulation.newton import minimise
-from yarnverify.simulation.search import NotConverged, solver_for
+from yarnverify.simulation.outcome import UNSOLVED, NotConverged
 
 Array = NDArray[Any]
 Scheme = Literal["implicit_euler", "midpoint", "bdf2"]
@@ -127,7 +127,7 @@ class Dynamics:
         self.scheme, self.held = scheme, held
         self.options = {"residual": 0.0, "step": 1e-16, "stable": False, "iterations": 100, **options}
         self.solver = solver
-        self._own: dict[str, Solver] = {}
+        self._any: Solver | None = None
         self._fixed = np.ones(self.system.size, bool)
         self._fixed[self.system.active] = False
 
@@ -163,7 +163,7 @@ class Dynamics:
             found = self.inertia.kinetic(q, v)
             force = found.slope - self.system.slope(q)
             potential = self.system.energy(q)
-        except (NotConverged, ElementError, LinearSolveError) as error:
+        except UNSOLVED as error:
             reason = f"the step of {h:.6g} s from time {motion.time:.6g} s has no end, a shorter one may have: "
             if isinstance(error, NotConverged):
                 raise NotConverged(reason + error.reason, error.Q, error.history, error.worst) from error
@@ -239,16 +239,10 @@ class Dynamics:
 
     def _solve(self, problem: Increment, start: Array, motion: Motion) -> tuple[Array, Array]:
         if self.inertia.bind(start, motion.Q, motion.Q_before):
-            found = minimise(problem, start, self.solver or self._symmetric(problem), **self.options)
+            found = minimise(problem, start, self.solver, **self.options)
             return found.Q, problem.lacking(found.gradient, found.step)
-        if "any" not in self._own:
-            self._own["any"] = SuperLU(problem.nodes, problem.coordinates)
-        return problem.solve(start, self.solver or self._own["any"]), np.zeros(self.system.count)
-
-    def _symmetric(self, problem: Increment) -> Solver:
-        if "symmetric" not in self._own:
-            self._own["symmetric"] = solver_for(problem, self.inertia.active_mass)
-        return self._own["symmetric"]
+        self._any = self._any or SuperLU(problem.nodes, problem.coordinates)
+        return problem.solve(start, self.solver or self._any), np.zeros(self.system.count)
 
     def _adapted(self, motion: Motion, h: float, wanted: float, tolerance: float) -> Motion:
         """A step of at most h whose estimated error is within the tolerance; what it returns was made in two halves."""

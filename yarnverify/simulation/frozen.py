@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from yarnverify.simulation.linear import Solver
 from yarnverify.simulation.problem import Evaluation, Worst
 
 if TYPE_CHECKING:
@@ -36,6 +37,11 @@ class Frozen:
     def nodes(self) -> Array:
         """Node of each unknown."""
         return self.increment.nodes
+
+    @property
+    def direct(self) -> Solver:
+        """A direct solver, which knows the pattern."""
+        return self.increment.direct
 
     @property
     def coordinates(self) -> Array | None:

@@ -1,9 +1,14 @@
-"""What a scene saves by modelling no more than it needs: the same scene with everything switched on, beside it."""
+"""What a scene saves by modelling no more than it needs: the same scene with everything switched on, beside it.
+
+With all sliding coordinates many a scene has no answer. A yarn that nothing crosses slides through its nodes: where it is
+straight that costs nothing, and where it is bent two nodes that draw together share a turn, each with the long segment beside
+it, for half the energy. So the energy falls to the border of the domain, where segments have no length. The record says so by
+the directions in which the energy falls, or does not change, at the scene's own answer.
+"""
 
 from __future__ import annotations
 
 import tracemalloc
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from time import process_time
@@ -11,25 +16,25 @@ from typing import Any
 
 import numpy as np
 
-from yarnverify.kernels import ElementError, bending, gravity, parallel_contact, shear, stretch
+from yarnverify.kernels import bending, gravity, parallel_contact, shear, stretch
 from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.fabric import bends, contacts, segments, shears
 from yarnverify.simulation.linear import LinearSolveError
+from yarnverify.simulation.outcome import UNSOLVED
 from yarnverify.simulation.runs import Run
-from yarnverify.simulation.search import NotConverged
 from yarnverify.simulation.setting import Known, Outcome, Setting, Static
 
 # what a scene does not say of its yarns is that of cotton: Y pi R^2 and EI with Y = 0.4 GPa and E = 0.8 GPa at R = 0.2 mm, a
 # shear modulus 4 k_x/L of 40 N/m at L = 1 mm, a contact that gives by a tenth of R under 2 mN; no weight where there was none
 COTTON: dict[str, Any] = {"k_s": 50.0, "k_b": 1e-9, "k_x": 0.01, "k_c": 1e5, "rho": 1e-4, "g": (0.0, 0.0, 0.0)}
 ALL = ((stretch, segments), (bending, bends), (shear, shears), (parallel_contact, contacts), (gravity, segments))
-ITERATIONS = 150  # of a stage, before it is given up
-PATIENCE = 60.0  # times as long as the scene itself takes, but LEAST seconds at least, before the rest is given up
-LEAST = 2.0
+ITERATIONS = 200  # of a problem at rest, before it is given up
+FLAT = 1e-12  # curvature, of a Hessian of unit diagonal, that rounding may have made: a direction that costs nothing
+DENSE = 2000  # unknowns up to which directions are counted
 
 
-class _TooSlow(Exception):
-    """Patience is at its end."""
+class _Enough(Exception):
+    """So many iterations were made."""
 
 
 def everything(setting: Setting, sliding: bool = True) -> Setting:
@@ -43,10 +48,7 @@ def everything(setting: Setting, sliding: bool = True) -> Setting:
             wanted = set(kernel.PARAMETERS) - set(elements.parameters)
             added.append(Term(kernel, elements, {key: COTTON[key] for key in wanted}, name))
     active = np.union1d(setting.active, setting.fabric.slides()) if sliding else setting.active
-    options = dict(setting.options)
-    if isinstance(setting, Static):
-        options["iterations"] = min(ITERATIONS, options.get("iterations", ITERATIONS))
-    return replace(setting, terms=[*setting.terms, *added], active=active, options=options)
+    return replace(setting, terms=[*setting.terms, *added], active=active)
 
 
 def frugality(setting: Setting, size: int) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -57,15 +59,31 @@ def frugality(setting: Setting, size: int) -> tuple[dict[str, Any], dict[str, An
     size
         Of the scene, for the record.
     """
-    own, own_timed, ended = _spent(setting, float("inf"))
+    own, own_timed, ended = _spent(setting)
     found: dict[str, Any] = {"size": size, "own": {**own, "moved": []}}
     timed: dict[str, Any] = {"own": own_timed}
-    patience = max(LEAST, PATIENCE * own_timed["seconds"])
     for name, sliding in (("all energies", False), ("all energies, all sliding", True)):
-        other, timed[name], end = _spent(everything(setting, sliding), patience)
+        whole = everything(setting, sliding)
+        other, timed[name], end = _spent(whole, ITERATIONS)
+        if end is None and ended is not None:
+            other |= _directions(whole, ended)
+            if isinstance(whole, Static):
+                end = _ended(Run(replace(whole, start=ended.Q, stages=whole.stages[-1:])), ITERATIONS)[0]
         moved = [] if ended is None or end is None else [_moved(known, ended, end) for known in setting.known]
         found[name] = {**other, "moved": moved}
     return found, timed
+
+
+def _directions(setting: Setting, own: Outcome) -> dict[str, Any]:
+    """Of a scene's own answer: in how many directions its energy falls with everything, and in how many it stays."""
+    system = Run(setting).system
+    if system.count > DENSE:
+        return {}
+    matrix = system.hessian(own.Q).toarray()
+    size = np.sqrt(np.abs(matrix.diagonal()))
+    size[size == 0] = 1.0
+    value = np.linalg.eigvalsh(matrix / size[:, None] / size)
+    return {"falling": int((value < -FLAT).sum()), "flat": int((np.abs(value) <= FLAT).sum())}
 
 
 def _moved(known: Known, one: Outcome, other: Outcome) -> dict[str, Any]:
@@ -74,49 +92,54 @@ def _moved(known: Known, one: Outcome, other: Outcome) -> dict[str, Any]:
         first, second = (np.asarray(known.found(end), float) for end in (one, other))
     except ValueError:
         return {"name": known.name, "by": None}
-    return {"name": known.name, "by": float(np.abs(first - second).max()) / known.size}
+    return {"name": known.name, "by": float(np.abs(first - second).max() / known.size)}
 
 
-def _spent(setting: Setting, patience: float) -> tuple[dict[str, Any], dict[str, Any], Outcome | None]:
-    begin, reached, trouble = process_time(), None, ""
+def _ended(run: Run, iterations: float) -> tuple[Outcome | None, str, int]:
+    """The end of a run, or what kept it from there; and how many iterations or steps were made."""
+    reached, made = None, 0
 
-    def wait(label: str) -> None:
-        if process_time() - begin > patience:
-            raise _TooSlow
+    def count(label: str) -> None:
+        nonlocal made
+        made += 1
+        if made > iterations:
+            raise _Enough
 
-    run = Run(setting, report=wait)
+    run.report = count
+    trouble = ""
     try:
-        for reached in run.go():
-            wait(f"{reached.time}")
-    except _TooSlow:
-        trouble = f"given up after {PATIENCE:g} times the time of the scene"
-    except (NotConverged, ElementError, LinearSolveError) as error:
+        for at in run.go():
+            reached, made = at, made + run.moving
+    except _Enough:
+        made, trouble = made - 1, f"no equilibrium after {iterations} iterations"
+    except UNSOLVED as error:
         trouble = str(error).split(";")[0].split(": ")[0]
+    return None if trouble or reached is None else run.outcome(reached.arrays()), trouble, made
+
+
+def _spent(setting: Setting, iterations: float = np.inf) -> tuple[dict[str, Any], dict[str, Any], Outcome | None]:
+    run, begin = Run(setting), process_time()
+    end, trouble, made = _ended(run, iterations)
     seconds = process_time() - begin
-    arrays: Mapping[str, Any] = {} if reached is None else reached.arrays()
-    done = int(arrays.get("iterations", 0))
-    system = run.system
     found = {
         "energies": {term.name: term.table.count for term in setting.terms},
-        "unknowns": int(system.count),
-        "entries": int(system.hessian(run.start).nnz),
-        "iterations": done,
+        "unknowns": int(run.system.count),
+        "entries": int(run.system.hessian(run.start).nnz),
+        "iterations": made,
         "trouble": trouble,
     }
-    timed = {"seconds": seconds, "seconds an iteration": seconds / done if done else None, "bytes": _memory(setting)}
-    return found, timed, None if trouble or reached is None else run.outcome(arrays)
+    timed = {"seconds": seconds, "seconds an iteration": seconds / made if made else None, "bytes": _memory(setting)}
+    return found, timed, end
 
 
 def _memory(setting: Setting) -> int:
     """Greatest memory of making the system, evaluating it and factorising its Hessian, bytes."""
-    from yarnverify.simulation.newton import solver_for
-
     tracemalloc.start()
     try:
         run = Run(setting)
         matrix = run.system.evaluate(run.start, True).matrix
         with suppress(LinearSolveError):  # a singular one takes the same memory
-            solver_for(run.system, matrix).factorise(matrix)
+            run.system.direct.factorise(matrix)
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

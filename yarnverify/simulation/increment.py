@@ -21,7 +21,7 @@ from yarnverify.kernels import ElementError
 from yarnverify.simulation.assembly import Evaluation, Worst
 from yarnverify.simulation.frozen import Frozen
 from yarnverify.simulation.inertia import Inertia
-from yarnverify.simulation.linear import LinearSolveError, SuperLU
+from yarnverify.simulation.linear import LinearSolveError, Solver, SuperLU
 from yarnverify.simulation.newton import minimise
 from yarnverify.simulation.search import EPSILON, Iteration, NotConverged
 
@@ -48,6 +48,11 @@ class Increment:
     def nodes(self) -> Array:
         """Node of each unknown."""
         return self.inertia.system.nodes
+
+    @property
+    def direct(self) -> Solver:
+        """A direct solver, which knows the pattern."""
+        return self.inertia.system.direct
 
     @property
     def coordinates(self) -> Array | None:

@@ -12,7 +12,7 @@ from scipy import sparse
 from yarnverify.kernels.batch import upper
 from yarnverify.simulation.assembly import System, Term
 from yarnverify.simulation.calls import CHUNK
-from yarnverify.simulation.pattern import Elements, zeros
+from yarnverify.simulation.pattern import TAKEN, Elements, zeros
 
 Array = NDArray[Any]
 
@@ -58,6 +58,20 @@ class Inertia:
         self._slides = rows[slides]
         self._sliding = bool((system.pattern.local[self._slides] >= 0).any())
         self._key = b""
+        system.calls.reserve(term)
+
+    @cached_property
+    def _number(self) -> dict[tuple[int, int], int]:
+        """Row of the packed Hessian of each pair of coordinates and rates."""
+        return {pair: k for k, pair in enumerate(upper(2 * self.half))}
+
+    @cached_property
+    def _packed(self) -> list[Array]:
+        """Rows of the packed Hessian by qq, qv, vq and vv, of each pair (i, j) of coordinates that matters, (k,) each."""
+        half, number = self.half, self._number
+        pairs = [upper(half)[k] for k in self._places.pairs]
+        found = ([number[i, j], number[i, half + j], number[j, half + i], number[half + i, half + j]] for i, j in pairs)
+        return list(np.array(list(found), int).reshape(-1, 4).T)
 
     def _run(self, wanted: str, q: Array, part: slice) -> list[Array]:
         return self.system.calls.run(self.term, wanted, q, part)
@@ -82,32 +96,26 @@ class Inertia:
 
     def jacobian(self, Q: Array, V: Array, rate: float, weight: float, share: float) -> tuple[Any, Any]:
         """``rate T_vv - share T_qq`` (symmetric) and ``weight (T_vq - T_qv)`` (skew), sparse, in the unknowns."""
-        half, pattern = self.half, self.system.pattern
-        number = {pair: k for k, pair in enumerate(upper(2 * half))}
-        pairs = [upper(half)[k] for k in self._places.pairs]
-        qq = np.array([number[i, j] for i, j in pairs], int)
-        vv = np.array([number[half + i, half + j] for i, j in pairs], int)
-        vq = np.array([number[j, half + i] for i, j in pairs], int)
-        qv = np.array([number[i, half + j] for i, j in pairs], int)
+        pattern = self.system.pattern
+        qq, qv, vq, vv = self._packed
         even, odd = pattern.zero(), pattern.zero()
-        every = np.arange(len(pairs))
+        rows = self._places.which
         for part, _, q in self._parts(Q, V):
             (packed,) = self._run("H", q, part)
-            self.system.scatter.blocks(even, self._places, part, rate * packed[vv] - share * packed[qq], every)
+            self.system.scatter.blocks(even, self._places, part, rate * packed[vv] - share * packed[qq], rows)
             # a pair stands for the entry (i, j) of the element, which may lie below the diagonal of the system
             values = weight * (packed[vq] - packed[qv])
             self._places.turn(values, part)
-            self.system.scatter.blocks(odd, self._places, part, values, every)
+            self.system.scatter.blocks(odd, self._places, part, values, rows)
         return pattern.matrix(even), pattern.skew(odd)
 
     @cached_property
     def mass(self) -> sparse.csr_array:
         """The constant mass matrix of all entries of a configuration (size, size), where no sliding coordinate moves."""
         half, size = self.half, self.system.size
-        number = {pair: k for k, pair in enumerate(upper(2 * half))}
         axes = [k for k, label in enumerate(self.term.kernel.DOFS[:half]) if "." in label]
         none = zeros(self.term.kernel.KERNEL)
-        pairs = [(i, j, number[half + min(i, j), half + max(i, j)]) for i in axes for j in axes]
+        pairs = [(i, j, self._number[half + min(i, j), half + max(i, j)]) for i in axes for j in axes]
         pairs = [pair for pair in pairs if pair[2] not in none]
         first, second, which = np.array(pairs, int).reshape(-1, 3).T
         total = sparse.csr_array((size, size))
@@ -142,16 +150,16 @@ class Inertia:
     def add_mass(self, matrix: sparse.csc_array, factor: float) -> None:
         """Add the constant mass matrix to one of the system's pattern, in place."""
         at, values = self._active_mass
-        matrix.data[at] += factor * values
+        for start in range(0, at.size, TAKEN):  # all at once, NumPy would take twice their memory
+            part = slice(start, start + TAKEN)
+            matrix.data[at[part]] += factor * values[part]
 
     @cached_property
     def _active_mass(self) -> tuple[Array, Array]:
         """Places and values of the entries that are not zero."""
-        number = {pair: k for k, pair in enumerate(upper(2 * self.half))}
-        pairs = [upper(self.half)[k] for k in self._places.pairs]
-        vv = np.array([number[self.half + i, self.half + j] for i, j in pairs], int)
+        _, _, _, vv = self._packed
         sums = self.system.pattern.zero()
         for part, _, q in self._parts(self._rest, np.zeros(self.system.size)):
             (packed,) = self._run("H", q, part)
-            self.system.scatter.blocks(sums, self._places, part, packed[vv], np.arange(len(pairs)))
+            self.system.scatter.blocks(sums, self._places, part, packed[vv], self._places.which)
         return self.system.pattern.nonzero(sums)

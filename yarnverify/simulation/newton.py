@@ -12,15 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.kernels import ElementError
 from yarnverify.simulation.assembly import System
-from yarnverify.simulation.linear import LinearSolveError, Solver
-from yarnverify.simulation.outcome import Equilibrium, Iteration, NotConverged, Options
+from yarnverify.simulation.linear import Solver
+from yarnverify.simulation.outcome import UNSOLVED, Equilibrium, Iteration, NotConverged, Options
 from yarnverify.simulation.problem import Problem
 from yarnverify.simulation.search import Search
-from yarnverify.simulation.steps import Steps, solver_for
+from yarnverify.simulation.steps import Steps
 
-__all__ = ["Equilibrium", "Iteration", "NotConverged", "Options", "Problem", "minimise", "solver_for", "stages"]
+__all__ = ["Equilibrium", "Iteration", "NotConverged", "Options", "Problem", "minimise", "stages"]
 
 Array = NDArray[Any]
 
@@ -40,7 +39,7 @@ def minimise(
     Q
         Where to start, (size,). What is not active stays as it is.
     solver
-        For symmetric matrices; direct if not given.
+        For symmetric matrices; the problem's direct one if not given.
     report
         Called with each iteration.
     options
@@ -55,9 +54,8 @@ def minimise(
     """
     limits = Options(**options)
     start = np.array(Q, float)
-    first = Search(
-        Steps(problem, solver), start, report, limits, returns=lambda: 1000 if problem.softness(start) > 0.1 else 1
-    )
+    steps = Steps(problem, solver or problem.direct)
+    first = Search(steps, start, report, limits, returns=lambda: 1000 if problem.softness(start) > 0.1 else 1)
     try:
         return first.run()
     except NotConverged as error:
@@ -128,7 +126,7 @@ def stages(
             start = np.where(fixed, Q_after if now == 1 else Q_before + now * (Q_after - Q_before), Q)
             try:
                 found = minimise(system, start, solver, **options)
-            except (NotConverged, ElementError, LinearSolveError):
+            except UNSOLVED:
                 size /= 2
                 if size < 0.5**halvings:
                     system.loads = load_before + done * (load_after - load_before)

@@ -7,6 +7,8 @@ from typing import Any, Literal, NamedTuple
 
 from numpy.typing import NDArray
 
+from yarnverify.kernels import ElementError
+from yarnverify.simulation.linear import LinearSolveError
 from yarnverify.simulation.problem import Worst
 
 Array = NDArray[Any]
@@ -77,6 +79,9 @@ class NotConverged(ArithmeticError):
             text += f"; worst element: {worst.term} {worst.element}, energy {worst.energy:.3e} J, state {worst.state.tolist()}"
         super().__init__(text)
         self.reason, self.Q, self.history, self.worst = reason, Q, history, worst
+
+
+UNSOLVED = (NotConverged, ElementError, LinearSolveError)  # what keeps a stage or a step from its end
 
 
 @dataclass(frozen=True)

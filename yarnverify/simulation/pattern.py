@@ -50,6 +50,11 @@ class Places:
     straight: Array
     transposed: Array
 
+    @cached_property
+    def rows(self) -> Array:
+        """Row of the packed Hessian of each entry, in the order in which they are summed, (k,)."""
+        return self.pairs[self.which]
+
     def turn(self, values: Array, part: slice) -> None:
         """Change the sign of entries (k, m) of a skew matrix where their block is summed transposed."""
         if self.turned.size:
@@ -181,15 +186,19 @@ class Pattern:
 
     def nonzero(self, sums: Array) -> tuple[Array, Array]:
         """Places and values of the entries of the matrix that are not zero."""
-        places, values = [np.empty(0, self.indptr.dtype)], [np.empty(0)]
-        for start in range(0, self._source.size, TAKEN):
-            entries = sums.take(self._source[start : start + TAKEN])
+        parts = [slice(start, start + TAKEN) for start in range(0, self._source.size, TAKEN)]
+        count = sum(int(np.count_nonzero(sums.take(self._source[part]))) for part in parts)
+        places, values, done = np.empty(count, self.indptr.dtype), np.empty(count), 0
+        for part in parts:
+            entries = sums.take(self._source[part])
             at = np.flatnonzero(entries)
-            places.append((start + at).astype(self.indptr.dtype))
-            values.append(entries[at])
-        return np.concatenate(places), np.concatenate(values)
+            here = slice(done, done + at.size)
+            places[here], values[here], done = part.start + at, entries[at], here.stop
+        return places, values
 
     def _entries(self, sums: Array) -> Array:
+        if self._source.size <= TAKEN:
+            return sums.take(self._source, mode="clip")
         found = np.empty(self._source.size)
         for start in range(0, found.size, TAKEN):  # all at once, NumPy would copy the indices to twice their size
             part = slice(start, start + TAKEN)

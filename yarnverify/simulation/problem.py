@@ -7,6 +7,8 @@ from typing import Any, NamedTuple, Protocol
 from numpy.typing import NDArray
 from scipy import sparse
 
+from yarnverify.simulation.linear import Solver
+
 Array = NDArray[Any]
 
 
@@ -42,6 +44,10 @@ class Problem(Protocol):
     @property
     def coordinates(self) -> Array | None:
         """Coordinates of the nodes, where all have some."""
+
+    @property
+    def direct(self) -> Solver:
+        """A direct solver for its Hessian."""
 
     def energy(self, Q: Array) -> float:
         """Energy of a configuration."""

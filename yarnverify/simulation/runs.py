@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from yarnverify.simulation.assembly import System
 from yarnverify.simulation.dynamics import Dynamics, Motion
 from yarnverify.simulation.linear import Solver, SuperLU
-from yarnverify.simulation.newton import stages
+from yarnverify.simulation.newton import NotConverged, stages
 from yarnverify.simulation.setting import Moving, Outcome, Setting, Static
 
 Array = NDArray[Any]
 State = Mapping[str, Any]
+SHORTEST = 1e-6  # of its rest length in the fabric: a segment below it has drawn together
 RESIDUAL = 1e-15  # of the greatest force: to rounding, so that exact answers come out to their last digits
 
 
@@ -113,6 +114,18 @@ class Run:
     def _linear(self) -> Solver | None:
         return SuperLU(self.system.nodes, self.system.coordinates) if self.solver == "superlu" else None
 
+    def _check(self, Q: Array) -> None:
+        """Refuse an end at the border of the domain, where rounding makes any force."""
+        for term in self.problem.terms:
+            if term.kernel.KERNEL.name != "stretch":
+                continue
+            first, second = (term.table.rows[term.kernel.DOFS.index(label)] for label in ("u0", "u1"))
+            share = (Q[second] - Q[first]) / (self.problem.fabric.Q[second] - self.problem.fabric.Q[first])
+            if share.size and not share.min() > SHORTEST:
+                at = int(np.argmin(share))
+                left = f"{share[at]:.0e} of the yarn between them is left"
+                raise NotConverged(f"the ends of {term.name} {at} have drawn together; {left}", Q, [], None)
+
     def _watched(self, time: float, Q: Array, motion: Motion | None) -> list[float]:
         seen = Outcome(self.problem.fabric, Q, self.system, {}, motion)
         return [time, *(float(value(seen)) for value in self.problem.watch.values())]
@@ -135,6 +148,7 @@ class Run:
                 self.system, guess, [stage.loads], [stage.held], solver, report=self._tell(number), **options
             ):
                 before, Q, iterations = Q, found.Q, iterations + found.iterations
+                self._check(Q)
             rows.append(self._watched(number + 1.0, Q, None))
             own: Callable[[], State] = partial(
                 dict, {"Q": Q, "Q before": before, "stage": number + 1, "iterations": iterations}
@@ -162,6 +176,7 @@ class Run:
             if frame:
                 frames, times = [*frames, after.Q], [*times, after.time]
             motion = after
+            self._check(motion.Q)
             rows.append(self._watched(motion.time, motion.Q, motion))
             own = partial(_of_motion, motion, frames, times)
             yield Reached(motion.time, motion.Q, partial(self._saved, rows, len(rows), own), frame)

@@ -34,7 +34,7 @@ class Scatter(Protocol):
         """``sums[at[k, e]] += values[k, e]``, k outermost."""
 
     def blocks(self, sums: Array, places: Places, part: slice, values: Array, rows: Array) -> None:
-        """Rows ``rows`` of values, one for each of ``places.pairs``, to where they go."""
+        """Rows ``rows`` of values, one for each entry in the order of ``places``, to where they go."""
 
 
 class Arrays:
@@ -48,20 +48,15 @@ class Arrays:
     def blocks(self, sums: Array, places: Places, part: slice, values: Array, rows: Array) -> None:
         """Add entries of blocks."""
         turned, block = None, -1
-        for number, which, straight, transposed in zip(
-            places.block.tolist(),
-            places.which.tolist(),
-            places.straight.tolist(),
-            places.transposed.tolist(),
-            strict=True,
-        ):
+        entries = (rows, places.block, places.straight, places.transposed)
+        for row, number, straight, transposed in zip(*(a.tolist() for a in entries), strict=True):
             if number != block:
                 block, base = number, places.base[number, part].astype(np.intp)
                 turned = places.turned[number, part].astype(np.intp) if places.turned.size else None
             at = base + straight
             if turned is not None and transposed != straight:
                 at += (transposed - straight) * turned
-            np.add.at(sums, at, values[rows[which]])
+            np.add.at(sums, at, values[row])
 
 
 class Loops:
@@ -84,8 +79,7 @@ class Loops:
         """Add entries of blocks."""
         turned = places.turned[:, part] if places.turned.size else places.turned
         self._blocks(
-            sums, places.base[:, part], turned, values, rows[places.which],
-            places.block, places.straight, places.transposed,
+            sums, places.base[:, part], turned, values, rows, places.block, places.straight, places.transposed
         )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -22,9 +23,9 @@ from yarnverify.simulation.linear import Factor, LinearSolveError
 from yarnverify.simulation.linear.threads import one_thread
 from yarnverify.simulation.outcome import Equilibrium, Iteration, Kind, NotConverged, Options
 from yarnverify.simulation.problem import Evaluation
-from yarnverify.simulation.steps import Steps, solver_for
+from yarnverify.simulation.steps import Steps
 
-__all__ = ["EPSILON", "Equilibrium", "Iteration", "NotConverged", "Options", "Search", "solver_for"]
+__all__ = ["EPSILON", "Equilibrium", "Iteration", "NotConverged", "Options", "Search"]
 
 Array = NDArray[Any]
 EPSILON = float(np.finfo(float).eps)
@@ -62,7 +63,7 @@ class Search:
     @one_thread()
     def run(self) -> Equilibrium:
         """Iterate to the end."""
-        self._lowest, self._lowest_energy = self.Q.copy(), np.inf
+        self._lowest, self._lowest_energy = self.Q, np.inf  # no configuration is changed in place
         self._start_again(self.Q, self.searching)
         ceiling, first = np.inf, True  # energy that the end must not exceed
         while len(self.history) < self.options.iterations and self._left >= 0:
@@ -72,6 +73,8 @@ class Search:
             progress = self._remember(value)
             factor, step = None, np.zeros(0)
             residual = size = greatest(value.gradient)
+            if not isfinite(residual):
+                raise NotConverged("the gradient is not finite", self._lowest, self.history, None)
             rest = residual <= self.options.residual * value.force
             if not rest:
                 factor, step = self._direction(value)
@@ -91,6 +94,7 @@ class Search:
                     return Equilibrium(self.Q, value.energy, self.history, negative, self.departures, self.steps.seconds,
                                        value.gradient, left)  # fmt: skip
                 continue
+            rough = factor is None  # a step of the semi-definite form
             value, factor = value._replace(matrix=_NOTHING), None  # their memory goes before that of the next comes
             progress |= size < 0.5 * self._step
             self._step = min(size, self._step)
@@ -102,13 +106,13 @@ class Search:
                 self.searching -= 1
                 self._note(value, residual, self._searched(value, step), "search")
             else:
-                self._note(value, residual, self._full(value, step, size), "full")
+                self._note(value, residual, self._full(value, step, size, rough), "full")
         raise self._failed(f"no equilibrium after {len(self.history)} iterations")
 
     # -- the course of a search
 
     def _start_again(self, Q: Array, searches: int) -> None:
-        self.Q, self._next = Q.copy(), None
+        self.Q, self._next = Q, None
         self._energy, self._step, self._stale, self._fulls = np.inf, np.inf, 0, 0
         self._residual, self.searching = np.inf, searches
 
@@ -122,7 +126,7 @@ class Search:
     def _remember(self, value: Evaluation) -> bool:
         """Keep the best state; whether the energy has decreased since the last start."""
         if value.energy < self._lowest_energy:
-            self._lowest, self._lowest_energy = self.Q.copy(), value.energy
+            self._lowest, self._lowest_energy = self.Q, value.energy
         if not value.energy < self._energy:
             return False
         self._energy = value.energy
@@ -136,10 +140,10 @@ class Search:
 
     def _explained(self, value: Evaluation, residual: float, size: float) -> bool:
         """Whether the coordinates cannot be told any better: the step or the residual is what rounding them makes of it."""
-        extent = float(np.ptp(self.Q))
+        extent = float(np.maximum.reduce(self.Q) - np.minimum.reduce(self.Q))
         if size <= self.options.step * extent:
             return True
-        if size > 1e-7 * extent:
+        if size > 1e-7 * extent and self._stale < 2:  # a soft direction may go to and fro with rounding for ever
             return False
         found = np.abs(value.gradient)
         before, self._residual = self._residual, residual
@@ -158,8 +162,6 @@ class Search:
             if not self.history:
                 raise
             raise NotConverged(f"the search led to where {error}", self._lowest, self.history, None) from error
-        if not np.isfinite(value.gradient).all():
-            raise NotConverged("the gradient is not finite", self._lowest, self.history, None)
         return value
 
     def _direction(self, value: Evaluation) -> tuple[Factor | None, Array]:
@@ -168,15 +170,19 @@ class Search:
         except LinearSolveError as error:
             raise self._failed(str(error)) from error
 
-    def _full(self, value: Evaluation, step: Array, size: float) -> float:
-        """The full step, or a search where it leads out of the domain of an element."""
-        Q = self.steps.moved(self.Q, step)
+    def _full(self, value: Evaluation, step: Array, size: float, rough: bool) -> float:
+        """The full step, or a search where it leads out of the domain of an element; more of it where it is a rough one."""
+        Q, share = self.steps.moved(self.Q, step), 1.0
         try:
             self._next = self.steps.evaluate(Q)
         except ElementError:
             return self._searched(value, step)
+        if rough and self._next.energy < value.energy:
+            share = self.steps.stretched(self.Q, self._next.energy, step)
+        if share > 1:
+            Q, self._next = self.steps.moved(self.Q, step, share), None
         self.Q = Q
-        return size
+        return share * size
 
     def _searched(self, value: Evaluation, step: Array) -> float:
         self.Q, length = self.steps.line_search(self.Q, value, step)

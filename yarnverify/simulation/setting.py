@@ -204,6 +204,10 @@ Setting = Static | Moving
 def rounding(condition: float) -> float:
     """Error that is allowed for an exact answer: 1e-12, or 64 units of rounding where these make more of it.
 
+    A search ends where no force is more than 8 units of |H| |Q|, of which a row adds up to 4 k/h times the extent for a chain
+    of springs k/h: 32. The kernels may add as much: 8 units in each of the 4 blocks of a row. That errors of many nodes could
+    all have one sign is not allowed for.
+
     Parameters
     ----------
     condition

@@ -11,22 +11,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from yarnverify.kernels import ElementError
-from yarnverify.simulation.linear import Banded, Factor, LinearSolveError, Multifrontal, Solver
+from yarnverify.simulation.linear import Factor, LinearSolveError, Solver
 from yarnverify.simulation.problem import Evaluation, Problem
 from yarnverify.simulation.stability import downhill, negative_direction
 
 Array = NDArray[Any]
 FEW = 4  # negative eigenvalues up to which their directions are found one by one
 NEAR = 0.1  # of the extent: the longest step where there are negative directions
-NARROW = 24  # band up to which banded Cholesky beats fronts
-
-
-def solver_for(problem: Problem, matrix: Any) -> Solver:
-    """A direct solver that suits a matrix: banded for a narrow band, else multifrontal."""
-    column = np.repeat(np.arange(matrix.shape[1]), np.diff(matrix.indptr))
-    if matrix.nnz == 0 or np.abs(matrix.indices - column).max() <= NARROW:
-        return Banded()
-    return Multifrontal(problem.nodes, problem.coordinates)
 
 
 @dataclass(eq=False)
@@ -34,7 +25,7 @@ class Steps:
     """Evaluations and solutions of a problem, and the time that they take."""
 
     problem: Problem
-    solver: Solver | None = None
+    solver: Solver
     seconds: dict[str, float] = field(default_factory=lambda: {"evaluation": 0.0, "solve": 0.0})
 
     def evaluate(self, Q: Array, definite: bool = False) -> Evaluation:
@@ -106,6 +97,20 @@ class Steps:
             share /= 2
         return Q, 0.0  # there is nothing to be gained in this direction
 
+    def stretched(self, Q: Array, energy: float, step: Array) -> float:
+        """How much of a step to make, by doubling as long as the energy falls below that at its end.
+
+        A semi-definite form is as stiff as ever where the Hessian is hardly negative, so that its steps away from a saddle
+        are far too short.
+        """
+        share, longest = 1.0, float(np.ptp(Q))
+        while 2 * share * float(np.abs(step).max()) < longest:
+            further = self.energy(self.moved(Q, step, 2 * share))
+            if not further < energy:
+                break
+            share, energy = 2 * share, further
+        return share
+
     def beside(self, Q: Array, value: Evaluation, factor: Factor | None) -> tuple[Array | None, int | None]:
         """A state of lower energy beside an unstable equilibrium, and else the number of negative eigenvalues."""
         if not value.gradient.size:
@@ -134,8 +139,6 @@ class Steps:
         return None, 0  # neutral, as far as the energy can tell
 
     def _factorise(self, matrix: Any) -> Factor:
-        if self.solver is None:
-            self.solver = solver_for(self.problem, matrix)
         start = perf_counter()
         try:
             return self.solver.factorise(matrix)

@@ -12,12 +12,10 @@ from time import monotonic, process_time
 from typing import Any
 
 from yarnverify.errors import InputError, NotRunError
-from yarnverify.kernels import ElementError
 from yarnverify.simulation.goals import add_orders, answer, missed
-from yarnverify.simulation.linear import LinearSolveError
+from yarnverify.simulation.outcome import UNSOLVED
 from yarnverify.simulation.runs import Reached, Run
 from yarnverify.simulation.scene import Line, Scene
-from yarnverify.simulation.search import NotConverged
 from yarnverify.simulation.setting import Setting
 from yarnverify.simulation.state import identity, load, save
 
@@ -169,7 +167,7 @@ def _finished(
             if monotonic() > saved + keeping.seconds:
                 keep(reached)
                 saved = monotonic()
-    except (NotConverged, ElementError, LinearSolveError) as error:
+    except UNSOLVED as error:
         last = f"; the last good state is in {path}" if path is not None and reached is not None else ""
         if reached is not None:
             keep(reached)

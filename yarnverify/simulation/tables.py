@@ -29,7 +29,7 @@ class Table:
     rows
         Indices into Q in the order of the kernel's ``DOFS``, (dofs, n).
     parameters
-        What the geometry knows of the kernel's parameters, by name, each (n,).
+        What the geometry knows of the kernel's parameters, by name, each a number () or (n,).
     places
         Where an element lies, by name, each (n,): ``yarn`` (index), ``node`` (the one it is about, or the first of two),
         ``place`` (that node's place in the fabric's chain).
@@ -49,7 +49,7 @@ class Table:
         chosen = np.asarray(chosen)
         return Table(
             np.ascontiguousarray(self.rows[:, chosen]),
-            {name: values[chosen] for name, values in self.parameters.items()},
+            {name: values[chosen] if values.ndim else values for name, values in self.parameters.items()},
             {name: values[chosen] for name, values in self.places.items()},
         )
 
@@ -86,7 +86,7 @@ def table(
     for row, label in zip(rows, kernel.DOFS, strict=True):
         name, _, axis = label.partition(".")
         row[:] = 3 * given[name] + "xyz".index(axis) if axis else given[name]
-    known = {name: np.full(count, value, float) if np.ndim(value) == 0 else np.asarray(value, float)
+    known = {name: np.asarray(value, float)
              for name, value in (parameters or {}).items() if name in kernel.PARAMETERS}  # fmt: skip
     return Table(rows, known, {name: np.asarray(value, np.int32) for name, value in (places or {}).items()})
 

@@ -7,7 +7,7 @@ after the other in one banded matrix. Sums are NumPy's own, not those of BLAS, w
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from yarnverify.simulation.linear.protocol import LinearSolveError, pattern_of, 
 from yarnverify.simulation.linear.threads import one_thread
 
 Array = NDArray[Any]
-COLUMNS = 32768  # of the matrix at a time
+COLUMNS = 8192  # of the matrix at a time
 
 
 def lines_of(fabric: Any, system: Any) -> list[list[Array]]:
@@ -49,10 +49,10 @@ class ConjugateGradients:
     """
 
     def __init__(self, families: Sequence[Sequence[Array]], tolerance: float = 1e-10, iterations: int = 5000) -> None:
-        self.lines = [np.concatenate([np.empty(0, np.int64), *yarns]) for yarns in families]
+        self.lines = [np.concatenate([np.empty(0, np.int32), *yarns]).astype(np.int32) for yarns in families]
         self._yarns = [np.repeat(np.arange(len(yarns), dtype=np.int32), [len(y) for y in yarns]) for yarns in families]
         self.tolerance, self.iterations = tolerance, iterations
-        self._bands: list[_Band] | None = None
+        self._widths: list[int] | None = None
         self._known: Any = None
 
     @one_thread()
@@ -64,65 +64,46 @@ class ConjugateGradients:
         LinearSolveError
             A block is not positive definite.
         """
-        if self._bands is None or not same_pattern(matrix, self._known):
-            if np.unique(np.concatenate([np.empty(0, np.int64), *self.lines])).size != matrix.shape[0]:
+        if self._widths is None or not same_pattern(matrix, self._known):
+            if np.unique(np.concatenate([np.empty(0, np.int32), *self.lines])).size != matrix.shape[0]:
                 raise ValueError("conjugate gradients: an unknown lies on no line")
-            self._bands = [_band(matrix, line, yarn) for line, yarn in zip(self.lines, self._yarns, strict=True)]
+            self._widths = [_width(matrix, line, yarn) for line, yarn in zip(self.lines, self._yarns, strict=True)]
             self._known = pattern_of(matrix)
         factors = []
-        for line, (width, source, target, lost, diagonal) in zip(self.lines, self._bands, strict=True):
-            band = np.zeros((line.size, width + 1))
-            band.reshape(-1)[target] = matrix.data[source]
-            for at in diagonal:
-                np.add.at(band[:, 0], at, np.abs(matrix.data[lost]))
-            factor, info = lapack.dpbtrf(band.T, lower=1, overwrite_ab=1)
+        for line, yarn, width in zip(self.lines, self._yarns, self._widths, strict=True):
+            factor, info = lapack.dpbtrf(_band(matrix, line, yarn, width).T, lower=1, overwrite_ab=1)
             if info:
                 raise LinearSolveError("conjugate gradients: the block of a yarn is not positive definite")
             factors.append((line, factor))
         return Gradients(matrix, factors, self.tolerance, self.iterations)
 
 
-class _Band(NamedTuple):
-    """Width of the band of a line, and where its entries come from and go to.
+def _band(matrix: Any, line: Array, yarn: Array, width: int) -> Array:
+    """The lower band of a line, (n, width + 1), a row for each column of the matrix.
 
     What lies outside of the band is lost to it; for its size both diagonal entries grow, which keeps the band positive definite
     wherever the matrix is. What couples one yarn with another is left out: a matrix without such blocks stays definite.
+    Where entries come from is found anew each time, at a hundredth of what a solution costs, and takes no memory in between.
     """
-
-    width: int
-    source: Array
-    target: Array
-    lost: Array
-    diagonal: tuple[Array, Array]
-
-
-def _band(matrix: Any, line: Array, yarn: Array) -> _Band:
-    place = np.full(matrix.shape[0], -1, np.int32)
-    place[line] = np.arange(line.size, dtype=np.int32)
-    counts = np.zeros(line.size, np.int64)
-    for _, _, distance in _inside(matrix, place, yarn):
-        counts += np.bincount(distance, minlength=line.size)
-    width = _width(counts)
-    kind: Any = np.int32 if max(matrix.nnz, line.size * (width + 1)) < 2**31 else np.int64
-    near: list[tuple[Array, Array]] = [(np.empty(0, kind),) * 2]
-    far: list[tuple[Array, Array, Array]] = [(np.empty(0, kind),) * 3]
-    for at, column, distance in _inside(matrix, place, yarn):
+    band = np.zeros((line.size, width + 1))
+    for at, column, distance in _inside(matrix, line, yarn):
         inside = distance <= width
-        target = column * (width + 1) + distance
-        near.append((at[inside].astype(kind), target[inside].astype(kind)))
+        band[column[inside], distance[inside]] = matrix.data[at[inside]]
         outside = ~inside
-        row = column + distance
-        far.append((at[outside].astype(kind), column[outside].astype(kind), row[outside].astype(kind)))
-    source, target = (np.concatenate(parts) for parts in zip(*near, strict=True))
-    lost, column, row = (np.concatenate(parts) for parts in zip(*far, strict=True))
-    return _Band(width, source, target, lost, (column, row))
+        if outside.any():
+            column, lost = column[outside], np.abs(matrix.data[at[outside]])
+            np.add.at(band[:, 0], column, lost)
+            np.add.at(band[:, 0], column + distance[outside], lost)
+    return band
 
 
-def _inside(matrix: Any, place: Array, yarn: Array) -> Iterator[tuple[Array, Array, Array]]:
+def _inside(matrix: Any, line: Array, yarn: Array) -> Iterator[tuple[Array, Array, Array]]:
     """Entries of the lower triangle of a line within its yarns: where, column in the line, distance from the diagonal.
 
     Some columns of the matrix at a time, since what is needed on the way is larger than the band.
     """
+    place = np.full(matrix.shape[0], -1, np.int32)
+    place[line] = np.arange(line.size, dtype=np.int32)
     for first in range(0, matrix.shape[1], COLUMNS):
         last = min(first + COLUMNS, matrix.shape[1])
         part = slice(int(matrix.indptr[first]), int(matrix.indptr[last]))
@@ -134,8 +115,11 @@ def _inside(matrix: Any, place: Array, yarn: Array) -> Iterator[tuple[Array, Arr
         yield part.start + mine[same], column[same], row[same] - column[same]
 
 
-def _width(counts: Array) -> int:
+def _width(matrix: Any, line: Array, yarn: Array) -> int:
     """The distance to which the entries of nearly every unknown of a line reach, without a gap."""
+    counts = np.zeros(line.size, np.int64)
+    for _, _, distance in _inside(matrix, line, yarn):
+        counts += np.bincount(distance, minlength=line.size)
     if not counts.size:
         return 0
     often = counts > counts[0] // 50
@@ -181,8 +165,8 @@ class Gradients:
         return x
 
     def _iterate(self, x: Array, residual: Array, goal: float) -> None:
-        direction = better = self._precondition(residual)
-        product = _sum(residual, better)
+        direction = self._precondition(residual)
+        product = _sum(residual, direction)
         self.steps = 0
         while _length(residual) > goal:
             image = self._matrix @ direction
@@ -192,10 +176,13 @@ class Gradients:
                 raise LinearSolveError("conjugate gradients: the matrix is not positive definite", found)
             step = product / curvature
             x += step * direction
-            residual -= step * image
+            image *= step
+            residual -= image
+            del image  # its memory serves for what comes next
             better = self._precondition(residual)
             before, product = product, _sum(residual, better)
-            direction = better + (product / before) * direction
+            direction *= product / before
+            direction += better
             self.steps += 1
             if self.steps > self._iterations:
                 raise LinearSolveError(

@@ -45,8 +45,9 @@ def buckling(
     if span <= 0:
         raise InputError(f"load = {load:g}: from 2.18 on the ends meet, and the load pulls")
     known = [
+        # entries 2 k_b/h^3 (6, -4, 1) of the Hessian are rounded, and its lowest eigenvalue is (pi/n)^4 2 k_b/h^3
         Known("load at which it buckles", "N", first, lambda end: critical(end.system, fabric.Q, push, 2 * first),
-              within=rounding(size * k_s / first + size**4)),
+              within=rounding(size * k_s / first + 6 * (size / math.pi) ** 4)),
         # near Euler's load the deflection goes with sqrt(load - 1), and so does what is left of an error in the load
         Known("deflection of the middle", "m", middle * length, lambda end: abs(end.points[size // 2, 2]), 2,
               1e-3 * max(1.0, 0.2 / abs(load - 1 or 1.0))),

@@ -1,4 +1,8 @@
-"""A cloth that falls on a sphere and drapes over it."""
+"""A cloth that falls on a sphere and drapes over it, with a fold at each corner.
+
+It is an open net of soft yarn, 16 cm wide, many times the 1 cm over which such a yarn holds itself up, (k_b/(2 rho g))^(1/3).
+Crossings rest on the sphere; where folds of the cloth meet they pass through each other.
+"""
 
 import numpy as np
 
@@ -23,16 +27,16 @@ from yarnverify.simulation.solids import Ball
 )
 def draped_cloth(
     size: int,
-    radius: float = positive(20e-3, "m", "of the sphere"),
-    until: float = positive(0.5, "s"),
-    h: float = positive(5e-3, "s", "implicit Euler damps what is faster, as air and friction of fibres do"),
-    k_s: float = positive(50.0, "N", "cotton yarn of 20 tex, 2.5 N/tex"),
-    k_b: float = positive(6e-10, "N m^2", "100 fibres of cotton that slide freely, 6e-12 N m^2 each"),
-    k_x: float = positive(5e-4, "N", "open cloth: 4 k_x/L = 1 N/m, a fifth of a light shirting"),
-    rho: float = positive(2e-5, "kg/m", "20 tex"),
-    k: float = positive(1e4, "N m^-2", "of the sphere: a depth of 0.1 mm carries 1e-4 N, the weight of 200 crossings"),
-    L: float = positive(2e-3, "m", "cheesecloth, 5 yarns a centimetre"),
-    R: float = positive(0.25e-3, "m", "20 tex, hardly twisted: 100 kg/m^3"),
+    radius: float = positive(34e-3, "m", "of the sphere"),
+    until: float = positive(0.6, "s"),
+    h: float = positive(10e-3, "s", "implicit Euler damps what is faster, as air and friction of fibres do"),
+    k_s: float = positive(10.0, "N", "4 % of 2.5 N/tex: crimp straightens long before fibres stretch"),
+    k_b: float = positive(3e-9, "N m^2", "500 fibres of cotton that slide freely, 6e-12 N m^2 each"),
+    k_x: float = positive(5e-4, "N", "open net: 4 k_x/L = 0.5 N/m, a tenth of a light shirting"),
+    rho: float = positive(1e-4, "kg/m", "cotton yarn of 100 tex"),
+    k: float = positive(1e4, "N m^-2", "of the sphere: a depth of 0.1 mm carries 1e-4 N, the weight of 13 crossings"),
+    L: float = positive(4e-3, "m", "scrim, 2.5 yarns a centimetre"),
+    R: float = positive(0.5e-3, "m", "100 tex, hardly twisted: 130 kg/m^3"),
     g: float = positive(9.81, "m/s^2", "gravity"),
     scheme: Scheme = choice("implicit_euler", "bdf2", "midpoint"),
 ) -> Moving:
