@@ -181,6 +181,17 @@ def test_a_loss_has_a_name(error: float, amplification: float | None, what: str)
     assert label(error, amplification) == what
 
 
+def test_an_energy_far_below_the_rounding_of_its_inputs_is_explained_by_their_condition(folder: Path) -> None:
+    """A deviation of 5e-32 that plain arithmetic finds to be 1e-16: its square is off by more than first order allows."""
+    text = (
+        "shear fast float64 0x0p+0,0x0p+0,-0x1.fffffffffffffp+0,-0x1p+1,-0x1p+0,0x0p+0,-0x1p+0,-0x1p+1,-0x1p+2"
+        " k_x=0x1.33acb4b8d6cb6p+0 L=0x1.8p+1"
+    )
+    row = next(row for row in replay(text, folder)["blocks"] if row["output"] == "E")
+    assert float(row["error"]) > 16 + 8 * float(row["condition"])
+    assert row["label"] == "conditioning"
+
+
 # -- regimes ----------------------------------------------------------------------------------------------------------
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from typing import Any
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from yarnverify import kernels
 from yarnverify.generation import DEFAULT_VARIANT
+from yarnverify.kernels.memory import LINE, aligned, scratch
 from yarnverify.symbolic.derive import declared_section
 from yarnverify.symbolic.forward import Evaluation
 from yarnverify.symbolic.numbers import Balls
@@ -338,3 +340,13 @@ def test_swapping_the_ends_of_a_bent_yarn_keeps_the_energy() -> None:
     swapped = q.copy()
     swapped[3:6], swapped[6:9] = q[6:9], q[3:6]
     np.testing.assert_array_equal(kernels.bending.energy(swapped, k_b=1.0), kernels.bending.energy(q, k_b=1.0))
+
+
+def test_memory_begins_at_cache_lines_and_is_one_for_each_thread() -> None:
+    for dtype, size in ((np.float64, 5), (np.float32, 70)):
+        assert aligned((3, size), dtype).ctypes.data % LINE == 0
+        assert all(row.ctypes.data % LINE == 0 for row in scratch(3, size, dtype))
+    here = scratch(2, 9, np.float64)
+    assert np.shares_memory(here, scratch(1, 9, np.float64))
+    with ThreadPoolExecutor(1) as pool:
+        assert not np.shares_memory(here, pool.submit(scratch, 2, 9, np.float64).result())

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from yarnverify.accuracy.conditioning import condition, hessian_condition
-from yarnverify.accuracy.metrics import OUTPUTS, Errors, measure, slices
+from yarnverify.accuracy.metrics import OUTPUTS, UNIT, Errors, measure, slices
 from yarnverify.accuracy.regimes import curve_points, points_of, regimes
 from yarnverify.accuracy.shape import shape_of
 from yarnverify.accuracy.truth import Points, Truth, truth
@@ -190,7 +190,7 @@ def _share(target: str, output: str, errors: Errors, conditions: _Conditions) ->
         for draws in (1, 0):  # a bound from below is cheaper, and often enough
             amplification = np.nan_to_num(conditions.at(output, int(point), draws if output == "H" else 0), nan=0.0)
             with np.errstate(over="ignore"):  # an infinite condition allows any finite error
-                share = float(np.where(np.isinf(column), np.inf, column / (EXACT + AMPLIFIED * amplification)).max())
+                share = float(np.where(np.isinf(column), np.inf, column / allowed(amplification)).max())
             if share <= 1 or output != "H":
                 break
         if share > worst:
@@ -340,7 +340,17 @@ def label(error: float, amplification: float | None) -> str:
         return "not finite"
     if error <= EXACT or amplification is None:
         return "exact"
-    return "conditioning" if error <= EXACT + AMPLIFIED * amplification else "computation"
+    return "conditioning" if error <= allowed(amplification) else "computation"
+
+
+def allowed(amplification: Any) -> Any:
+    """Units that a method without compensation may lose at a condition number.
+
+    A relative change h of the inputs changes a square, as an energy near rest is one, by c h + (c h)^2 / 4; here h is
+    ``AMPLIFIED`` units. The second term counts only where the first leaves no digit.
+    """
+    first = AMPLIFIED * amplification
+    return EXACT + first + first * first * (UNIT["float64"] / 4)
 
 
 def _spread(conditions: _Conditions, exact: Truth) -> dict[str, Any]:

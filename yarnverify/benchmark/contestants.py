@@ -8,11 +8,10 @@ from __future__ import annotations
 import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from yarnverify.benchmark.peers import PEERS
-from yarnverify.benchmark.ways import Array, Outputs, Way, degrees_of_freedom, empty_outputs, kept, outputs_bytes
+from yarnverify.benchmark.ways import Array, Outputs, Way, degrees_of_freedom, kept_outputs, outputs_bytes
 from yarnverify.errors import NotRunError
 from yarnverify.kernels import VARIANTS
 from yarnverify.symbolic.declare import Energy
@@ -83,7 +82,7 @@ def _kernel(energy: Energy, name: str, threads: int) -> Contestant:
     options: dict[str, Any] = {"threads": threads, "engine": engine or "numpy"}
     dof = degrees_of_freedom(energy)
 
-    arrays = kept(partial(empty_outputs, dof))
+    arrays = kept_outputs(dof)
 
     def run(q: Array, values: tuple[float, ...]) -> Outputs:
         named = dict(zip(module.PARAMETERS, values, strict=True))

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from yarnverify.kernels.memory import aligned
+
 Array = NDArray[Any]
+Layout = Literal["component-first", "element-first"]
 Outputs = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True)
 class Way:
-    """One way of calling a contestant; outputs are new arrays at every call.
+    """One way of calling a contestant; its outputs may be the same arrays at every call.
 
     Attributes
     ----------
@@ -33,7 +36,7 @@ class Way:
 
     how: str
     hessian: str
-    layout: str
+    layout: Layout
     run: Callable[[Array, tuple[float, ...]], Outputs]
     bytes_at: Callable[[int], int]
 
@@ -55,12 +58,15 @@ def chunks(n: int, chunk: int | None) -> Iterator[slice]:
         yield slice(start, min(start + step, n))
 
 
-def empty_outputs(dof: int, n: int) -> Outputs:
-    """New arrays, component first: (n,), (dof, n) and the packed (dof (dof+1)/2, n)."""
-    return np.empty(n), np.empty((dof, n)), np.empty((sizes(dof), n))
+def empty_outputs(dof: int, n: int, layout: Layout = "component-first") -> Outputs:
+    """New arrays that begin at cache lines: (n,), (dof, n) and the packed (dof (dof+1)/2, n), or the latter two turned."""
+    shapes = (n,), (dof, n), (sizes(dof), n)
+    turned = shapes if layout == "component-first" else tuple(shape[::-1] for shape in shapes)
+    energy, gradient, hessian = (aligned(shape, float) for shape in turned)
+    return energy, gradient, hessian
 
 
-def kept(make: Callable[[int], Outputs]) -> Callable[[int], Outputs]:
+def kept_outputs(dof: int, layout: Layout = "component-first") -> Callable[[int], Outputs]:
     """Arrays for so many elements, the same ones again as long as the number stays, as a simulation keeps its own.
 
     What the system takes to hand out fresh memory varies threefold from call to call, and is nobody's formula.
@@ -70,7 +76,7 @@ def kept(make: Callable[[int], Outputs]) -> Callable[[int], Outputs]:
     def arrays(n: int) -> Outputs:
         if n not in last:
             last.clear()
-            last[n] = make(n)
+            last[n] = empty_outputs(dof, n, layout)
         return last[n]
 
     return arrays

@@ -28,6 +28,7 @@ from yarnverify.kernels.inputs import (
     parameters_of,
     rows_of,
 )
+from yarnverify.kernels.memory import aligned, scratch
 from yarnverify.kernels.scaling import exponents, scaled, unscale
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ CHUNK = 8192  # elements at a time, so that scratch memory stays in the cache
 _MODERATE = {np.dtype(np.float64): 2.0**100, np.dtype(np.float32): 2.0**14}
 
 Where: TypeAlias = slice | Array
-_Evaluator: TypeAlias = Callable[[list[Array], list[Any], list[Array]], tuple[Array, Array]]
+_Evaluator: TypeAlias = Callable[[Array, list[Any], list[Array]], tuple[Array, Array]]
 
 
 class Worker(Protocol):
@@ -196,7 +197,7 @@ class Batch:
             from yarnverify.kernels.compiled import Loops
 
             return Loops(self)
-        return _Arrays(self, min(CHUNK, self.n))
+        return _Arrays(self)
 
     def _some(self, ranges: list[slice], worker: Worker | None = None) -> None:
         """The chunks of one thread: all in the first shape, then those of the second, then those that need care."""
@@ -247,33 +248,31 @@ class Batch:
             return None
         return np.asarray(~((margins > low) & (margins < self.limit)).all(axis=0))
 
-    def evaluator(self, shape: int, scratch: Array) -> _Evaluator:
+    def evaluator(self, shape: int) -> _Evaluator:
         """A function that fills targets with the outputs of a shape by NumPy, and gives margins and choice as rows."""
         kernel, checks = self.kernel, len(self.kernel.shapes[shape].checks)
         if kernel.numbers == "double-double":
             from yarnverify.kernels.doubledouble import evaluator
 
-            extra = evaluator(kernel.outputs(shape, self.wanted))
+            pairs = evaluator(kernel.outputs(shape, self.wanted))
+
+            def extra(rows: Array, values: list[Any], targets: list[Array]) -> Array:
+                return pairs(list(rows + 0.0), values, targets)
         else:
             tape = kernel.tape(shape, self.wanted, self.dtype)
 
-            def extra(rows: list[Array], values: list[Any], targets: list[Array]) -> Array:
-                rest = np.empty((tape.outputs - len(targets), rows[0].size), self.dtype)
-                tape.run([*rows, *values], [*targets, *rest], scratch[: tape.scratch, : rows[0].size])
+            def extra(rows: Array, values: list[Any], targets: list[Array]) -> Array:
+                memory = scratch(self.dof + tape.scratch, rows.shape[1], self.dtype)
+                inputs = np.add(rows, 0.0, out=memory[: self.dof])  # -0.0 is 0.0
+                rest = np.empty((tape.outputs - len(targets), rows.shape[1]), self.dtype)
+                tape.run([*inputs, *values], [*targets, *rest], memory[self.dof :])
                 return rest
 
-        def run(rows: list[Array], values: list[Any], targets: list[Array]) -> tuple[Array, Array]:
+        def run(rows: Array, values: list[Any], targets: list[Array]) -> tuple[Array, Array]:
             rest = extra(rows, values, targets)
             return rest[:checks], rest[checks:]
 
         return run
-
-    def scratch(self, most: int) -> Array:
-        """Memory for intermediate values of whatever shape."""
-        if self.kernel.numbers == "double-double":
-            return np.empty((0, 0))
-        tapes = [self.kernel.tape(shape, self.wanted, self.dtype) for shape in range(len(self.kernel.shapes))]
-        return np.empty((max(tape.scratch for tape in tapes), most), self.dtype)
 
     # -- elements that need care
 
@@ -312,8 +311,7 @@ class Batch:
         rows = rows[:, picked]
         values = [value if np.ndim(value) == 0 else value[picked] for value in values]
         part = np.empty((found.shape[0], rows.shape[1]), self.dtype)
-        run = self.evaluator(shape, self.scratch(rows.shape[1]))
-        margins, choice = run(list(rows), values, list(part))
+        margins, choice = self.evaluator(shape)(rows, values, list(part))
         found[:, picked] = part
         return margins, choice
 
@@ -325,35 +323,31 @@ class Batch:
 
 
 class _Arrays:
-    """NumPy calls a chunk at a time; scratch memory is kept, since fresh memory costs more than the arithmetic on it."""
+    """NumPy calls a chunk at a time."""
 
-    def __init__(self, batch: Batch, most: int) -> None:
-        self._batch, self._most = batch, most
-        self._inputs = np.empty((batch.dof, most), batch.dtype)
-        self._scratch = batch.scratch(most)
-        self._by_first = batch.evaluator(0, self._scratch)
+    def __init__(self, batch: Batch) -> None:
+        self._batch = batch
+        self._by_first = batch.evaluator(0)
 
     @cached_property
     def _by_second(self) -> _Evaluator:
-        return self._batch.evaluator(1, self._scratch)
+        return self._batch.evaluator(1)
 
     @cached_property
     def _part(self) -> Array:
-        """Results of the second shape, before they go where they belong."""
-        return np.empty((len(self._batch.targets(slice(0, 0))), self._most), self._batch.dtype)
+        """Results of the second shape, before they go where they belong; kept, as fresh memory costs more than they do."""
+        return aligned((len(self._batch.targets(slice(0, 0))), min(CHUNK, self._batch.n)), self._batch.dtype)
 
     def first(self, where: slice) -> tuple[Array, Array]:
         batch = self._batch
-        rows = np.add(batch.rows[:, where], 0.0, out=self._inputs[:, : where.stop - where.start])  # -0.0 is 0.0
-        found = self._by_first(list(rows), batch.values_at(where), batch.targets(where))
+        found = self._by_first(batch.rows[:, where], batch.values_at(where), batch.targets(where))
         batch.mirror(where)
         return found
 
     def second(self, at: Array) -> Array:
         batch = self._batch
         part = self._part[:, : at.size]
-        rows = list(batch.rows.take(at, axis=1) + 0.0)
-        margins, _ = self._by_second(rows, batch.values_at(at), list(part))
+        margins, _ = self._by_second(batch.rows.take(at, axis=1), batch.values_at(at), list(part))
         batch.scatter(at, part)
         return margins
 

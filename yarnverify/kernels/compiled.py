@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from yarnverify.kernels.batch import Batch
 
 Array = NDArray[Any]
-BLOCK = 64  # elements whose inputs and results stay in the cache together
+BLOCK = 256  # elements whose inputs and results stay in the cache together
+STRIDE = BLOCK + 8  # from row to row: with a power of two all rows would fall into the same few lines of the cache
 _MAKING = threading.Lock()  # threads that share a batch make its loop once
 _INFIX = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
 _PREFIX = {"negative": "-", "positive": "+"}
@@ -47,7 +48,7 @@ def source_of(tape: Tape, layout: str) -> str:
     layout
         ``C`` if all arrays lie in memory row by row without gaps, which is the faster; else ``A``.
     """
-    given, found = tape.inputs * BLOCK, tape.outputs * BLOCK
+    given, found = tape.inputs * STRIDE, tape.outputs * STRIDE
     body = "\n            ".join(_statements(tape))
     return f"""from math import acos, cos, exp, log, sin, sqrt, tan
 
@@ -64,7 +65,7 @@ outputs = types.Array(real, 3, "{layout}")
 @njit(nogil=True, error_model="numpy")
 def write(found, places, out, first, at, count):
     for k in range(places.shape[0]):
-        source = found[places[k, 0] * {BLOCK}:]
+        source = found[places[k, 0] * {STRIDE}:]
         if at.size:
             row = out[places[k, 1], places[k, 2]]
             for j in range(count):
@@ -90,22 +91,22 @@ def loop(q, values, first, number, at, places_e, energy, places_g, gradient, pla
         for k in range(rows):
             if at.size:
                 for j in range(count):
-                    given[k * {BLOCK} + j] = q[k, now[j]] + real(0)
+                    given[k * {STRIDE} + j] = q[k, now[j]] + real(0)
             else:
                 row = q[k, first + start:]
                 for j in range(count):
-                    given[k * {BLOCK} + j] = row[j] + real(0)
+                    given[k * {STRIDE} + j] = row[j] + real(0)
         for k in range(more):
             for j in range(count):
-                given[(rows + k) * {BLOCK} + j] = values[k, start + j]
-        for j in range({BLOCK}):
+                given[(rows + k) * {STRIDE} + j] = values[k, start + j]
+        for j in range(min({BLOCK}, (count + 7) // 8 * 8)):
             {body}
         write(found, places_e, energy, first + start, now, count)
         write(found, places_g, gradient, first + start, now, count)
         write(found, places_h, hessian, first + start, now, count)
         for k in range(rest.shape[0]):
             for j in range(count):
-                rest[k, start + j] = found[({tape.outputs} - rest.shape[0] + k) * {BLOCK} + j]
+                rest[k, start + j] = found[({tape.outputs} - rest.shape[0] + k) * {STRIDE} + j]
 """
 
 
@@ -117,7 +118,7 @@ def _statements(tape: Tape) -> list[str]:
     def name(slot: int) -> str:
         return f"real({tape.constants[slot - constants]!r})" if slot >= constants else fresh[slot]
 
-    lines = [f"x{i} = given[{i * BLOCK} + j]" for i in range(tape.inputs)]
+    lines = [f"x{i} = given[{i * STRIDE} + j]" for i in range(tape.inputs)]
     for step, (operation, operands, result) in enumerate(tape.calls):
         values = [name(slot) for slot in operands]
         if operation in _INFIX:
@@ -132,7 +133,7 @@ def _statements(tape: Tape) -> list[str]:
             text = f"{_CALLS[operation]}({values[0]})"
         fresh[result] = f"v{step}"
         lines.append(f"v{step} = {text}")
-    return lines + [f"found[{i * BLOCK} + j] = {fresh[outputs + i]}" for i in range(tape.outputs)]
+    return lines + [f"found[{i * STRIDE} + j] = {fresh[outputs + i]}" for i in range(tape.outputs)]
 
 
 def _load(text: str) -> Callable[..., None]:

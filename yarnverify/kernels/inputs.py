@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from yarnverify.kernels.memory import aligned
+
 if TYPE_CHECKING:
     from yarnverify.kernels.runtime import Kernel
 
@@ -91,7 +93,7 @@ def complain(kernel: Kernel, elements: Array, reasons: Mapping[int, str]) -> Non
 def outputs_of(kernel: Kernel, shapes: Sequence[tuple[int, ...]], dtype: Any, out: Out) -> list[Array]:
     """Arrays for the results: the caller's, or new ones."""
     if out is None:
-        return [np.empty(shape, dtype) for shape in shapes]
+        return [aligned(shape, dtype) for shape in shapes]
     given: list[Array] = [out] if isinstance(out, np.ndarray) else list(out)
     if [(a.shape, a.dtype) for a in given] != [(shape, dtype) for shape in shapes]:
         raise ValueError(f"{kernel.name}: out must be {dtype} arrays of shapes {list(shapes)}")

@@ -194,8 +194,13 @@ class Tape:
     dtype: np.dtype[Any]
 
     @cached_property
-    def _array_calls(self) -> list[tuple[Any, tuple[int, ...], int]]:
-        return [(_OWN.get(name) or getattr(np, name), slots, result) for name, slots, result in self.calls]
+    def _array_calls(self) -> list[tuple[Any, int, int, int, int]]:
+        """Function, slots of three operands, -1 for what there is not, and slot of the result."""
+        found = []
+        for name, slots, result in self.calls:
+            first, second, third = (*slots, -1, -1)[:3]
+            found.append((_OWN.get(name) or getattr(np, name), first, second, third, result))
+        return found
 
     @cached_property
     def _scalar_calls(self) -> list[tuple[Any, tuple[int, ...], int]]:
@@ -208,13 +213,13 @@ class Tape:
     def run(self, inputs: Sequence[Any], outputs: Sequence[Array], scratch: Array) -> None:
         """Evaluate a chunk: every input (m,) or 0-d, every output (m,), scratch (rows, m)."""
         slots: list[Any] = [*inputs, *outputs, *scratch, *self._constants]
-        for ufunc, operands, result in self._array_calls:
-            if len(operands) == 2:
-                ufunc(slots[operands[0]], slots[operands[1]], slots[result])
-            elif len(operands) == 1:
-                ufunc(slots[operands[0]], slots[result])
+        for ufunc, first, second, third, result in self._array_calls:
+            if third >= 0:
+                ufunc(slots[first], slots[second], slots[third], slots[result])
+            elif second >= 0:
+                ufunc(slots[first], slots[second], slots[result])
             else:
-                ufunc(slots[operands[0]], slots[operands[1]], slots[operands[2]], slots[result])
+                ufunc(slots[first], slots[result])
 
     def run_one(self, inputs: Sequence[float]) -> list[float]:
         """Outputs of a single element, in Python floats: the same bits at a tenth of the cost.

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from yarnverify.kernels import ElementError
 from yarnverify.kernels.batch import Batch
 from yarnverify.kernels.inputs import Engine
+from yarnverify.kernels.memory import aligned
 from yarnverify.simulation.pattern import Places
 from yarnverify.simulation.semidefinite import Form
 from yarnverify.simulation.terms import Term
@@ -71,7 +72,7 @@ class Calls:
         if (dof, n) not in self._memory:
             heights = np.cumsum([0, 1, dof, dof * (dof + 1) // 2, dof])
             if heights[-1] * n > self._room.size:
-                self._room = np.empty(max(int(heights[-1]) * n, self._needed))
+                self._room = aligned((max(int(heights[-1]) * n, self._needed),), float)
             energy, *others = (self._room[a * n : b * n].reshape(b - a, n) for a, b in pairwise(heights.tolist()))
             self._memory[dof, n] = [energy[0], *others]
         return self._memory[dof, n]

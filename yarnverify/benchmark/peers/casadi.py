@@ -13,7 +13,7 @@ import casadi
 import numpy as np
 
 from yarnverify.benchmark.peers.walk import FORMS, Functions, energy_of
-from yarnverify.benchmark.ways import Array, Outputs, Way, degrees_of_freedom, kept, outputs_bytes, sizes
+from yarnverify.benchmark.ways import Array, Outputs, Way, degrees_of_freedom, kept_outputs, outputs_bytes, sizes
 from yarnverify.errors import NotRunError
 from yarnverify.symbolic.declare import Energy
 
@@ -65,7 +65,7 @@ def _way(energy: Energy, compiler: str, form: str) -> Way:
     dof = degrees_of_freedom(energy)
     loop = _compiled(compiler, _function(energy, dof, form), dof)
 
-    arrays = kept(lambda n: (np.empty(n), np.empty((n, dof)), np.empty((n, sizes(dof)))))
+    arrays = kept_outputs(dof, "element-first")
 
     def run(q: Array, values: tuple[float, ...]) -> Outputs:
         n = q.shape[1]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,8 +15,7 @@ from yarnverify.benchmark.ways import (
     Way,
     chunks,
     degrees_of_freedom,
-    empty_outputs,
-    kept,
+    kept_outputs,
     outputs_bytes,
 )
 from yarnverify.symbolic.declare import Energy
@@ -34,7 +32,7 @@ def ways(energy: Energy) -> tuple[Way, ...]:
     rows, parameters, expression = energy_expression(energy, FORMS[1])
     function = sp.lambdify([*rows, *parameters], expression, modules="numpy", cse=True)
 
-    arrays = kept(partial(empty_outputs, dof))
+    arrays = kept_outputs(dof)
 
     def way(chunk: int) -> Way:
         def run(q: Array, values: tuple[float, ...]) -> Outputs:

@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 
 from yarnverify.benchmark.peers.walk import FORMS, Functions, energy_of
-from yarnverify.benchmark.ways import Array, Outputs, Way, chunks, degrees_of_freedom, kept, outputs_bytes, sizes
+from yarnverify.benchmark.ways import Array, Outputs, Way, chunks, degrees_of_freedom, kept_outputs, outputs_bytes
 from yarnverify.symbolic.declare import Energy
 
 PACKAGES = ("jax", "jaxlib")
@@ -78,7 +78,7 @@ def _way(name: str, function: Any, chunk: int | None, dof: int, parameters: int)
         e, g, h = jax.block_until_ready(function(q, np.array(values)))
         return np.asarray(e), np.asarray(g), np.asarray(h)
 
-    arrays = kept(lambda n: (np.empty(n), np.empty((n, dof)), np.empty((n, sizes(dof)))))
+    arrays = kept_outputs(dof, "element-first")
 
     def chunked(q: Array, values: tuple[float, ...]) -> Outputs:
         n, given = q.shape[1], np.array(values)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import sympy as sp
@@ -15,8 +14,7 @@ from yarnverify.benchmark.ways import (
     Way,
     chunks,
     degrees_of_freedom,
-    empty_outputs,
-    kept,
+    kept_outputs,
     outputs_bytes,
 )
 from yarnverify.symbolic.declare import Energy
@@ -36,7 +34,7 @@ def _ways(energy: Energy, form: str) -> list[Way]:
     dof = degrees_of_freedom(energy)
     temporaries = 8 * (len(sp.cse(outputs, list=False)[0]) + len(outputs))
 
-    arrays = kept(partial(empty_outputs, dof))
+    arrays = kept_outputs(dof)
 
     def way(chunk: int | None) -> Way:
         def run(q: Array, values: tuple[float, ...]) -> Outputs:

@@ -12,7 +12,7 @@ from sympy.printing.pycode import PythonCodePrinter
 
 from yarnverify.benchmark.peers.symbols import expressions
 from yarnverify.benchmark.peers.walk import FORMS
-from yarnverify.benchmark.ways import Array, Outputs, Way, degrees_of_freedom, kept, outputs_bytes, sizes
+from yarnverify.benchmark.ways import Array, Outputs, Way, degrees_of_freedom, kept_outputs, outputs_bytes, sizes
 from yarnverify.symbolic.declare import Energy
 
 PACKAGES = ("numba",)
@@ -29,7 +29,7 @@ def _way(energy: Energy, form: str) -> Way:
     exec(_source(energy, form), namespace)
     loop = numba.njit(namespace["loop"], error_model="numpy")
 
-    arrays = kept(lambda n: (np.empty(n), np.empty((n, dof)), np.empty((n, sizes(dof)))))
+    arrays = kept_outputs(dof, "element-first")
 
     def run(q: Array, values: tuple[float, ...]) -> Outputs:
         n = q.shape[1]
