@@ -16,6 +16,7 @@ import pytest
 from yarnverify import cli
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.simulation import command
+from yarnverify.simulation.study import Keeping, study
 
 STAGED = """
 import os, signal, time
@@ -158,6 +159,22 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(
     assert again.returncode == 0, again.stderr
     assert states(parted) == states(whole) and frames(parted) == frames(whole)
     assert (parted / "result.json").read_bytes() == (whole / "result.json").read_bytes()
+
+
+def test_a_state_is_kept_only_with_its_picture(tmp_path: Path) -> None:
+    """An interrupt while a step of the series is written leaves the state before it, from which both are made again."""
+    seen: list[Any] = []
+
+    def watch(problem: Any, reached: Any) -> None:
+        seen.append(reached)
+        if len(seen) == 4:  # the start, two steps, and this one
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        study(command.find("thrown_cloth"), [5], {"scheme": "midpoint"}, keeping=Keeping(tmp_path, watch=watch))
+    (path,) = (tmp_path / "states").glob("*.npz")
+    with np.load(path) as state:
+        assert int(state["steps"]) == 2 and float(state["time"]) == seen[2].time
 
 
 def test_going_on_with_a_run_that_is_done_changes_nothing(tmp_path: Path, swing: Path) -> None:
