@@ -108,8 +108,10 @@ def test_files_of_a_study_are_the_same_bytes_twice(tmp_path: Path) -> None:
 
 def test_a_new_run_in_the_same_folder_leaves_nothing_of_the_old_one(tmp_path: Path, swing: Path) -> None:
     run(str(swing), tmp_path / "out", given=("steps=10",))
+    half = tmp_path / "out" / "states" / ".direct-3.npz.abc"  # as a process that is killed leaves one
+    half.touch()
     run(str(swing), tmp_path / "out", given=("steps=4", "rest=yes"), sizes=(5,))
-    assert list(states(tmp_path / "out")) == ["direct-5.npz"]
+    assert list(states(tmp_path / "out")) == ["direct-5.npz"] and not half.exists()
     assert len(frames(tmp_path / "out")) == 6  # start, four stages, and their list
 
 
@@ -170,6 +172,7 @@ def test_a_state_is_kept_only_with_its_picture(tmp_path: Path) -> None:
         if len(seen) == 4:  # the start, two steps, and this one
             raise KeyboardInterrupt
 
+    (tmp_path / "states").mkdir()
     with pytest.raises(KeyboardInterrupt):
         study(command.find("thrown_cloth"), [5], {"scheme": "midpoint"}, keeping=Keeping(tmp_path, watch=watch))
     (path,) = (tmp_path / "states").glob("*.npz")
