@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +83,17 @@ def test_the_record_of_a_scene_and_its_page(tmp_path: Path) -> None:
     text = pages({**others, "simulation": again})["simulation.md"]
     assert "| sliding_yarn | 64 segments | rest length of a segment |" in text
     assert "| sliding_yarn, 16 segments | as it is | stretch 16 | 15 | 43 |" in text
-    assert "simulation.md" not in pages(others)
+    assert "simulation.md" not in pages(others) and "To be looked at" not in text
+    drawn: list[str] = []
+    small = replace(find("draped_cloth"), sizes=(3,))
+    seen = record.measure([], draw=lambda study: drawn.append(study.result["scene"]), shown=[small])
+    text = pages({**others, "simulation": {**again, "shown": seen["shown"]}}, pictures={"draped_cloth.png"})[
+        "simulation.md"
+    ]
+    assert (
+        drawn == ["draped_cloth"] and "draped over a sphere: 3 yarns of each family, 63 unknowns, 60 steps in" in text
+    )
+    assert "![The end of the scene: a cloth draped over a sphere](pictures/draped_cloth.png)" in text
     del each["frugality"]
     assert spared_table(again) is None
 

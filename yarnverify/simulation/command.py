@@ -93,7 +93,7 @@ def listing() -> list[str]:
 
 
 def record_all(folder: Path, pictures: bool, tell: Tell) -> tuple[Path, list[str]]:
-    """Run every scene that has a known answer and write the record below a folder of reports; goals that were missed.
+    """Run every scene, those for looking at last, and write the record below a folder of reports; goals that were missed.
 
     Parameters
     ----------
@@ -107,14 +107,19 @@ def record_all(folder: Path, pictures: bool, tell: Tell) -> tuple[Path, list[str
         from yarnverify.simulation.view import picture
 
         problem, path = found.problem, folder / "pictures" / f"{found.result['scene']}.png"
-        title, size = found.result["title"], (960, 720)
-        picture(
-            problem.fabric, found.arrays["Q"], path, colour=problem.colour, view=problem.view, title=title, size=size
-        )
+        look = {
+            "colour": problem.colour,
+            "view": problem.view,
+            "solids": problem.solids,
+            "title": found.result["title"],
+        }
+        picture(problem.fabric, found.arrays["Q"], path, size=(960, 720), **look)
 
     drawn = {"draw": draw} if pictures and importlib.util.find_spec("matplotlib") else {}
-    record = measure([scene for scene in SCENES if scene.validates], tell, **drawn)
-    return write(record, folder), [line for each in record["scenes"] for line in each["result"]["missed"]]
+    validating, others = ([scene for scene in SCENES if scene.validates is known] for known in (True, False))
+    record = measure(validating, tell, **drawn, shown=others)
+    every = [*record["scenes"], *record["shown"]]
+    return write(record, folder), [line for each in every for line in each["result"]["missed"]]
 
 
 def simulate(

@@ -1,4 +1,6 @@
-"""``yarnverify simulate --write``: every scene that has a known answer, and what it would cost with everything switched on."""
+"""``yarnverify simulate --write``: every scene that has a known answer, and what it would cost with everything switched on;
+and the scenes that are there to be looked at.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,10 @@ ROUNDS = 2  # the shorter time of these counts: the first one meets cold memory
 
 
 def measure(
-    scenes: Sequence[Scene], tell: Tell = lambda label, done: None, draw: Callable[[Study], None] = lambda found: None
+    scenes: Sequence[Scene],
+    tell: Tell = lambda label, done: None,
+    draw: Callable[[Study], None] = lambda found: None,
+    shown: Sequence[Scene] = (),
 ) -> dict[str, Any]:
     """The record: for each scene a ``result``, the same each time on a machine, and timings, which belong to a moment.
 
@@ -25,9 +30,22 @@ def measure(
     ----------
     draw
         Called with each study, to make a picture of it.
+    shown
+        Scenes that are run once, to be drawn.
     """
-    found = [_measured(scene, (number, len(scenes)), tell, draw) for number, scene in enumerate(scenes)]
-    return {"schema": 1, "command": COMMAND, "environment": environment(("scipy",), None), "scenes": found}
+    count = len(scenes) + len(shown)
+    found = [_measured(scene, (number, count), tell, draw) for number, scene in enumerate(scenes)]
+    seen = [_shown(scene, (number, count), tell, draw) for number, scene in enumerate(shown, len(scenes))]
+    made = {"schema": 1, "command": COMMAND, "environment": environment(("scipy",), None), "scenes": found}
+    return {**made, "shown": seen} if seen else made
+
+
+def _shown(scene: Scene, place: tuple[int, int], tell: Tell, draw: Callable[[Study], None]) -> dict[str, Any]:
+    found = study(
+        scene, scene.sizes, {}, tell=lambda label, done: tell(f"{scene.name}, {label}", (place[0] + done) / place[1])
+    )
+    draw(found)
+    return {"result": found.result, "timings": found.timings}
 
 
 def _measured(scene: Scene, place: tuple[int, int], tell: Tell, draw: Callable[[Study], None]) -> dict[str, Any]:
