@@ -16,6 +16,7 @@ import pytest
 from yarnverify import cli
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.simulation import command
+from yarnverify.simulation.study import Keeping, study
 
 STAGED = """
 import os, signal, time
@@ -107,8 +108,10 @@ def test_files_of_a_study_are_the_same_bytes_twice(tmp_path: Path) -> None:
 
 def test_a_new_run_in_the_same_folder_leaves_nothing_of_the_old_one(tmp_path: Path, swing: Path) -> None:
     run(str(swing), tmp_path / "out", given=("steps=10",))
+    half = tmp_path / "out" / "states" / ".direct-3.npz.abc"  # as a process that is killed leaves one
+    half.touch()
     run(str(swing), tmp_path / "out", given=("steps=4", "rest=yes"), sizes=(5,))
-    assert list(states(tmp_path / "out")) == ["direct-5.npz"]
+    assert list(states(tmp_path / "out")) == ["direct-5.npz"] and not half.exists()
     assert len(frames(tmp_path / "out")) == 6  # start, four stages, and their list
 
 
@@ -160,6 +163,23 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(
     assert (parted / "result.json").read_bytes() == (whole / "result.json").read_bytes()
 
 
+def test_a_state_is_kept_only_with_its_picture(tmp_path: Path) -> None:
+    """An interrupt while a step of the series is written leaves the state before it, from which both are made again."""
+    seen: list[Any] = []
+
+    def watch(problem: Any, reached: Any) -> None:
+        seen.append(reached)
+        if len(seen) == 4:  # the start, two steps, and this one
+            raise KeyboardInterrupt
+
+    (tmp_path / "states").mkdir()
+    with pytest.raises(KeyboardInterrupt):
+        study(command.find("thrown_cloth"), [5], {"scheme": "midpoint"}, keeping=Keeping(tmp_path, watch=watch))
+    (path,) = (tmp_path / "states").glob("*.npz")
+    with np.load(path) as state:
+        assert int(state["steps"]) == 2 and float(state["time"]) == seen[2].time
+
+
 def test_going_on_with_a_run_that_is_done_changes_nothing(tmp_path: Path, swing: Path) -> None:
     run(str(swing), tmp_path / "out", given=("steps=6",))
     before = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir() if path.is_file()}
@@ -200,6 +220,7 @@ def test_another_run_is_not_gone_on_with(tmp_path: Path, swing: Path) -> None:
         (["raising.py"], 2, "raising.py:2:1: ZeroDivisionError: division by zero"),
         (["empty.py"], 2, "empty.py must declare one scene, a function under @scene(...); it declares 0"),
         (["elastica", "--set", "alpha=1e9"], 2, "alpha = P L^2/EI must be positive and at most 100000"),
+        (["elastica", "--size", "999999999999999"], 3, "yarnverify: this needs more memory than there is: Unable to allocate"),
         (["bias_extension", "--set", "strain=2"], 2, "the cloth cannot be deformed so far"),
     ],
 )  # fmt: skip
@@ -216,6 +237,11 @@ def test_one_clear_error(
     shown = capsys.readouterr()
     assert ended.value.code == status and message in shown.err, shown.err
     assert shown.err.count("\n") == 1 and not shown.out
+
+
+def test_yarns_too_stiff_for_their_coordinates_are_refused() -> None:
+    with pytest.raises(InputError, match=r"k_s = 1e\+12 N is 3e\+18 times k_b .*; at most 4.*e\+09 N"):
+        run("elastica", sizes=(160,), given=("k_s=1e12",))
 
 
 def test_missed_goals_are_exit_status_1(

@@ -43,6 +43,8 @@ def main() -> None:
         stop(str(error))
     except NotRunError as error:
         stop(str(error), 3)
+    except MemoryError as error:
+        stop(f"yarnverify: this needs more memory than there is: {error or 'none is left'}", 3)
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)

@@ -198,9 +198,9 @@ class Files:
             raise InputError(f"{self.folder} holds no run to go on with")
         try:
             states.mkdir(parents=True, exist_ok=True)
-            if not self.resume:
-                for old in [*states.glob("*.npz"), *self.folder.glob(f"{self.name}_*.vtp")]:
-                    old.unlink()
+            done = [] if self.resume else [*states.glob("*.npz"), *self.folder.glob(f"{self.name}_*.vtp")]
+            for old in [*states.glob(".*.npz.*"), *done]:  # halves of a process that was killed, and a run before
+                old.unlink()
         except OSError as error:
             raise NotRunError(f"{self.folder} cannot be written: {error.strerror or error}") from None
 

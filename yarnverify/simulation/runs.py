@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from yarnverify.errors import InputError
 from yarnverify.simulation.assembly import System
 from yarnverify.simulation.dynamics import Dynamics, Motion
 from yarnverify.simulation.linear import Solver, SuperLU
@@ -23,6 +24,7 @@ from yarnverify.simulation.setting import Moving, Outcome, Setting, Static
 
 Array = NDArray[Any]
 State = Mapping[str, Any]
+STIFFEST = 1e16  # k_s l^2/k_b
 SHORTEST = 1e-6  # of its rest length in the fabric: a segment below it has drawn together
 RESIDUAL = 1e-15  # of the greatest force: to rounding, so that exact answers come out to their last digits
 
@@ -74,6 +76,7 @@ class Run:
         if start.shape != (p.fabric.size,):
             raise ValueError(f"the start must have shape ({p.fabric.size},), not {start.shape}")
         self.start = start
+        _told(p)
         if isinstance(p, Moving):
             self._dynamics = Dynamics(p.fabric.Q, p.terms, p.active, p.kinetic, p.loads, scheme=p.scheme, held=p.held,
                                       **p.options)  # fmt: skip
@@ -191,6 +194,19 @@ class Run:
         """What is saved: of rows that go on growing, those of a state."""
         columns = np.array(rows[:count]).reshape(count, len(self._names)).T
         return {**own(), **{f"recorded {name}": column for name, column in zip(self._names, columns, strict=True)}}
+
+
+def _told(problem: Setting) -> None:
+    """Refuse yarns so stiff that rounding of their coordinates makes more force than bending them does."""
+    given = {term.kernel.KERNEL.name: term.parameters for term in problem.terms if term.table.count}
+    if not {"stretch", "bending"} <= given.keys():
+        return
+    k_s, k_b = float(np.max(given["stretch"]["k_s"])), float(np.min(given["bending"]["k_b"]))
+    extent = float(np.ptp(problem.fabric.points(problem.fabric.Q), axis=0).max())
+    if k_s * extent**2 > STIFFEST * k_b:
+        most = STIFFEST * k_b / extent**2
+        raise InputError(f"k_s = {k_s:g} N is {k_s * extent**2 / k_b:.0e} times k_b over the square of {extent:g} m: "
+                         f"coordinates cannot tell how such a yarn bends; at most {most:.2g} N")  # fmt: skip
 
 
 def _of_motion(motion: Motion, frames: list[Array], times: list[float]) -> dict[str, Any]:

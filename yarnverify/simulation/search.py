@@ -143,7 +143,9 @@ class Search:
         extent = float(np.maximum.reduce(self.Q) - np.minimum.reduce(self.Q))
         if size <= self.options.step * extent:
             return True
-        if size > 1e-7 * extent and self._stale < 2:  # a soft direction may go to and fro with rounding for ever
+        # a soft direction may go to and fro with rounding for ever
+        idle = self._stale >= 2 and residual <= 1e-6 * value.force
+        if size > 1e-7 * extent and not idle:
             return False
         found = np.abs(value.gradient)
         before, self._residual = self._residual, residual

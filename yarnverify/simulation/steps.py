@@ -136,7 +136,8 @@ class Steps:
                 if self.energy(tried) < value.energy - 1e-14 * abs(value.energy):
                     return tried, None
             size /= 2
-        return None, 0  # neutral, as far as the energy can tell
+        # rounding hides it from the energy, as it does where yarns hardly stretch; Newton's method finds on from further away
+        return self.moved(Q, direction, 0.01 * float(np.ptp(Q))), None
 
     def _factorise(self, matrix: Any) -> Factor:
         start = perf_counter()

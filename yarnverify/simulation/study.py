@@ -160,10 +160,10 @@ def _finished(
             spent += process_time() - begin  # processor time, of the solution alone
             if step is None:
                 break
-            reached = step
-            told("", reached.time / run.length)
+            told("", step.time / run.length)
             if shown:
-                keeping.watch(run.problem, reached)
+                keeping.watch(run.problem, step)
+            reached = step  # only now: a state that is kept has its picture
             if monotonic() > saved + keeping.seconds:
                 keep(reached)
                 saved = monotonic()
