@@ -345,8 +345,9 @@ def test_swapping_the_ends_of_a_bent_yarn_keeps_the_energy() -> None:
 def test_memory_begins_at_cache_lines_and_is_one_for_each_thread() -> None:
     for dtype, size in ((np.float64, 5), (np.float32, 70)):
         assert aligned((3, size), dtype).ctypes.data % LINE == 0
-        assert all(row.ctypes.data % LINE == 0 for row in scratch(3, size, dtype))
-    here = scratch(2, 9, np.float64)
-    assert np.shares_memory(here, scratch(1, 9, np.float64))
+        assert all(row.ctypes.data % LINE == 0 for row in scratch("steps", 3, size, dtype))
+    here = scratch("steps", 2, 9, np.float64)
+    assert np.shares_memory(here, scratch("steps", 1, 9, np.float64))
+    assert not np.shares_memory(here, scratch("results", 1, 9, np.float64))
     with ThreadPoolExecutor(1) as pool:
-        assert not np.shares_memory(here, pool.submit(scratch, 2, 9, np.float64).result())
+        assert not np.shares_memory(here, pool.submit(scratch, "steps", 2, 9, np.float64).result())

@@ -122,7 +122,7 @@ def test_rigid_motion_keeps_the_energy(energy: str, variant: str) -> None:
         error[sliding] = U * np.abs(moved[sliding, 0])
         other = Element(moved, element.parameters)
         (before,), (after,) = (with_value(module, one, "energy")[0] for one in (element, other))
-        true = truth(declared(energy), points_of([element]))
+        true = truth(declared(energy), points_of([other]))  # in the frame that the errors are in
         assume(true.has_derivatives[0])
         first = np.abs(true.gradient[:, 0]) @ error
         second = error @ np.abs(true.hessian[..., 0]) @ error

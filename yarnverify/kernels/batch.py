@@ -28,7 +28,7 @@ from yarnverify.kernels.inputs import (
     parameters_of,
     rows_of,
 )
-from yarnverify.kernels.memory import aligned, scratch
+from yarnverify.kernels.memory import scratch
 from yarnverify.kernels.scaling import exponents, scaled, unscale
 
 if TYPE_CHECKING:
@@ -262,7 +262,7 @@ class Batch:
             tape = kernel.tape(shape, self.wanted, self.dtype)
 
             def extra(rows: Array, values: list[Any], targets: list[Array]) -> Array:
-                memory = scratch(self.dof + tape.scratch, rows.shape[1], self.dtype)
+                memory = scratch("steps", self.dof + tape.scratch, rows.shape[1], self.dtype)
                 inputs = np.add(rows, 0.0, out=memory[: self.dof])  # -0.0 is 0.0
                 rest = np.empty((tape.outputs - len(targets), rows.shape[1]), self.dtype)
                 tape.run([*inputs, *values], [*targets, *rest], memory[self.dof :])
@@ -333,11 +333,6 @@ class _Arrays:
     def _by_second(self) -> _Evaluator:
         return self._batch.evaluator(1)
 
-    @cached_property
-    def _part(self) -> Array:
-        """Results of the second shape, before they go where they belong; kept, as fresh memory costs more than they do."""
-        return aligned((len(self._batch.targets(slice(0, 0))), min(CHUNK, self._batch.n)), self._batch.dtype)
-
     def first(self, where: slice) -> tuple[Array, Array]:
         batch = self._batch
         found = self._by_first(batch.rows[:, where], batch.values_at(where), batch.targets(where))
@@ -346,7 +341,7 @@ class _Arrays:
 
     def second(self, at: Array) -> Array:
         batch = self._batch
-        part = self._part[:, : at.size]
+        part = scratch("results", len(batch.targets(slice(0, 0))), at.size, batch.dtype)
         margins, _ = self._by_second(batch.rows.take(at, axis=1), batch.values_at(at), list(part))
         batch.scatter(at, part)
         return margins

@@ -23,15 +23,15 @@ def aligned(shape: tuple[int, ...], dtype: DTypeLike) -> Array:
     return memory[start : start + size].reshape(shape)
 
 
-def scratch(rows: int, most: int, dtype: DTypeLike) -> Array:
+def scratch(purpose: str, rows: int, most: int, dtype: DTypeLike) -> Array:
     """Uninitialised rows (rows, most), each beginning a cache line, that are the caller's until the thread asks again.
 
-    Every thread keeps its own, a few megabytes: fresh memory can cost as much as the arithmetic on it.
+    Every thread keeps its own for each purpose, a few megabytes: fresh memory can cost more than the arithmetic on it.
     """
     line = LINE // np.dtype(dtype).itemsize
     length = -(-most // line) * line
     needed = rows * length * np.dtype(dtype).itemsize
-    if getattr(_KEPT, "memory", np.empty(0)).size < needed:
-        _KEPT.memory = aligned((needed,), np.uint8)
-    found: Array = _KEPT.memory[:needed].view(dtype).reshape(rows, length)[:, :most]
+    if getattr(_KEPT, purpose, np.empty(0)).size < needed:
+        setattr(_KEPT, purpose, aligned((needed,), np.uint8))
+    found: Array = getattr(_KEPT, purpose)[:needed].view(dtype).reshape(rows, length)[:, :most]
     return found

@@ -30,8 +30,9 @@ Digits: TypeAlias = Literal["plain", "exact", "twice"]
 # How near to 1 the cosine between the edges may come; a yarn folded further has sines whose products may underflow.
 _SMOOTH_UP_TO = 1 - sp.Rational(1, 2**20)
 _PLAIN_DOWN_TO = sp.Rational(1, 2**16)  # sine; a plain cross product keeps some 37 of 53 bits there
-# The same where translation gives the rows of the common point: beyond, its sums cancel more than conditions explain.
-_MOVED_SMOOTH_UP_TO, _MOVED_PLAIN_DOWN_TO = sp.Rational(15, 16), sp.Rational(1, 3)
+# Edges of lengths l and l' that end nearer to each other than the square root of so many l l': blocks at their common point
+# are so much smaller than the others that their sums cancel more than the condition explains.
+_APART = sp.Rational(1, 8)
 
 
 def safe_program(
@@ -65,14 +66,17 @@ def safe_program(
     if choice is not None:
         choice = choice.xreplace({reading.value(length(s.vector)): _symbol(s.l.name) for s in segments})
     if safe.corner is not None and safe.shape == "smooth" and not alone:
-        choice = (_MOVED_SMOOTH_UP_TO if safe.by_translation else _SMOOTH_UP_TO) - _symbol(safe.corner.name("C"))
+        choice = _SMOOTH_UP_TO - _symbol(safe.corner.name("C"))
     if safe.corner is not None and safe.shape == "polar":
         ends = "0 or pi" if alone else "0" if safe.corner.sign > 0 else "pi"
         what, level = ("value", "energy") if safe.has_pole and not alone else ("derivative", "derivatives")
         text = f"{safe.corner.symbol} is {ends}, where the energy has no {what}"
         checks.append((_symbol(safe.corner.name("size")), level, text))
         if guarded:
-            choice = _symbol(safe.corner.name("s")) - (_MOVED_PLAIN_DOWN_TO if safe.by_translation else _PLAIN_DOWN_TO)
+            choice = _symbol(safe.corner.name("s")) - _PLAIN_DOWN_TO
+    if safe.corner is not None and safe.by_translation:
+        a, b, cosine = (_symbol(name) for name in (safe.corner.a.l.name, safe.corner.b.l.name, safe.corner.name("C")))
+        choice = sp.Function("select")(choice, a / b + b / a - 2 * cosine - _APART, choice)  # both must be positive
     sums = Sums(energy, safe, reading, digits)
     if choice is not None:
         choice = sums.safe(sp.sympify(choice))  # whether an energy acts is a jump: never a matter of rounding
