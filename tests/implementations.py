@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from yarnverify.kernels.accurate import bending, shear, stretch
+from yarnverify.kernels.printed import bending as printed
 
 
 def _of(kernel: Any, q: Any, **parameters: Any) -> tuple[Any, Any, Any]:
@@ -198,6 +199,69 @@ def shear_without_lengths(x0: Any, x1: Any, x3: Any) -> Any:
     size = -120 * (np.arccos(np.clip(a @ b, -1, 1)) - 1.57)
     c = np.cross(a, b)
     return np.cross(a, c) * size, np.cross(c, b) * size
+
+
+def bending_mixed_signs(q: Any, k_b: Any) -> Any:
+    """The gradient of the points, and the force on u1 and u2."""
+    _, g, _ = _of(bending, q, k_b=k_b)
+    g[9:] *= -1
+    return {"gradient": g}
+
+
+def bending_mixed_signs_losing(x0: Any, x1: Any, x2: Any, u1: float, u2: float, k_b: float) -> Any:
+    """The same by textbook formulas, so that no block passes."""
+    g = -bending_arccos(x0, x1, x2, u1, u2, k_b)["force"]
+    g[9:] *= -1
+    return {"gradient": g}
+
+
+def bending_sign_and_length(q: Any, k_b: Any) -> Any:
+    e, g, h = bending_without_length(q, k_b)
+    return e, -g, -h
+
+
+def bending_printed_with_a_step(q: Any, k_b: Any) -> Any:
+    """Minus the squared time step times the printed Jacobian."""
+    _, g, h = _of(printed, q, k_b=k_b)
+    return {"gradient": g, "hessian": 1e-6 * h}
+
+
+def bending_supplement(x0: Any, x1: Any, x2: Any, u1: float, u2: float, k_b: float) -> Any:
+    a, b = (x1 - x0) / np.linalg.norm(x1 - x0), (x2 - x0) / np.linalg.norm(x2 - x0)
+    return float(k_b * np.arccos(a @ b) ** 2 / (u1 - u2))
+
+
+def bending_sum_left_out(q: Any, k_b: Any) -> Any:
+    e, g, h = _of(bending, q, k_b=k_b)
+    g[:3] = -g[3:6]
+    return e, g, h
+
+
+def bending_of_curvature(x0: Any, x1: Any, x2: Any, k_b: float) -> Any:
+    """The energy of discrete elastic rods: the curvature binormal over the lengths of the edges."""
+    a, b = x0 - x2, x1 - x0
+    l_a, l_b = np.linalg.norm(a), np.linalg.norm(b)
+    curvature = 2 * np.cross(a, b) / (l_a * l_b + a @ b)
+    return float(k_b * (curvature @ curvature) / (l_a + l_b))
+
+
+def shear_in_degrees(x0: Any, x1: Any, x3: Any, k_x: float, L: float) -> Any:
+    a, b = x1 - x0, x3 - x0
+    phi = np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+    return float(0.5 * k_x * L * (phi - 90) ** 2)
+
+
+def parallel_contact_always(u0: float, u1: float, k_c: float, L: float, d: float) -> Any:
+    """Pulls where it should have let go."""
+    gap, k = u1 - u0 - d, k_c * L
+    return {"energy": 0.5 * k * gap**2, "force": [k * gap, -k * gap], "jacobian": [[-k, k], [k, -k]]}
+
+
+def stretch_of_nodes(q: Any, k_s: Any) -> Any:
+    """Forces and their Jacobian, rows x0, u0, x1, u1."""
+    mine = [0, 1, 2, 6, 3, 4, 5, 7]
+    _, g, h = _of(stretch, q[np.argsort(mine)], k_s=k_s)
+    return -g[mine], -h[np.ix_(mine, mine)]
 
 
 def bending_single_inside(q: Any, k_b: Any) -> Any:

@@ -107,6 +107,18 @@ def test_single_precision_is_held_to_its_own_unit() -> None:
         ("shear_gauss_newton", "holds first derivatives only (Gauss-Newton)"),
         ("shear_definite", "has its negative eigenvalues set to zero"),
         ("shear_rounded_pi", "wrong: G[x0] G[x1] G[x3]: takes 1.57 for pi/2"),
+        ("bending_sign_and_length", "wrong: H[x1,x1]: lacks a factor 1/|x1 - x0|, and has the wrong sign"),
+        (
+            "bending_printed_with_a_step",
+            "H[x1,x1]: is what the document prints, misprint included: equation (18), times 1e-06",
+        ),
+        ("bending_supplement", "takes pi minus the angle for the angle: its cosine has the wrong sign"),
+        ("bending_sum_left_out", "wrong: G[x0]: lacks minus x2: it is left out of a sum"),
+        (
+            "bending_of_curvature",
+            "is 4 (u1 - u2) (tan(angle/2)/angle)^2/(|x1 - x0| + |x0 - x2|) times what it should be",
+        ),
+        ("shear_in_degrees", "is (180/pi)^2 times what it should be: an angle in degrees"),
         ("bending_single_inside", "is in single precision"),
         ("bending_differences", "digits everywhere: a difference quotient"),
     ],
@@ -164,7 +176,14 @@ def test_only_the_mistaken_blocks_fail() -> None:
         ("bending_force_unsaid", {}, "matches with --force"),
         ("bending_all_signs", {}, "matches with --force --jacobian"),
         ("bending_of_arrays", {"force": True}, "matches with no --force"),
-        ("bending_half", {}, "--with k_b=k_b/(0.5)"),
+        ("bending_half", {}, "--with k_b=k_b/(1/2)"),
+        (
+            "bending_sign_and_length",
+            {},
+            "the signs are right with --force --jacobian; 1 block fails then, of 31, for other reasons",
+        ),
+        ("bending_mixed_signs", {}, "x0 x1 x2 have the sign of the gradient, u1 u2 have that of the force"),
+        ("stretch_of_nodes", {"energy": "stretch"}, "matches with --order x0,u0,x1,u1 --force --jacobian"),
         ("bending_without_stiffness", {}, "matches with --fix k_b=1"),
     ],
 )
@@ -172,6 +191,21 @@ def test_another_convention_is_found(name: str, options: dict[str, Any], hint: s
     found = checked(name, regimes=ONE, **options)
     assert not found.passes
     assert any(hint in text for text in found.hints), (found.hints, said(found))
+
+
+def test_no_sign_fits_blocks_that_differ_even_where_all_fail() -> None:
+    found = checked("bending_mixed_signs_losing")
+    assert not any(block.passes for block, _ in found.found)
+    assert found.hints == [
+        "signs differ from block to block, so that none fits all: x0 x1 x2 have the sign of the gradient, u1 u2 have that of "
+        "the force"
+    ]
+
+
+def test_a_force_where_there_should_be_none() -> None:
+    found = checked("parallel_contact_always")
+    assert not any(block.passes for block, _ in found.found)
+    assert {d.reasons for _, d in found.found} == {("is not zero where the energy does not act",)}
 
 
 def test_two_mistakes_in_one_block() -> None:
@@ -502,6 +536,50 @@ def test_the_command_and_its_exit_status(tmp_path: Path, capsys: pytest.CaptureF
 def test_the_record_is_the_same_every_time() -> None:
     first, second = (json.dumps(record(checked("bending_transposed"))) for _ in range(2))
     assert first == second
+
+
+def test_the_shim_of_the_readme(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if shutil.which("g++") is None or not Path("/usr/include/eigen3/Eigen/Dense").exists():
+        pytest.skip("no g++ with Eigen here")
+    readme = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+    source = re.search(r"<!-- shim.cpp -->\n```cpp\n(.*?)```", readme, re.DOTALL)
+    compiling = re.search(r"^(g\+\+ .*)\n(yarnverify check ./libmine.so:stretch .*)\n", readme, re.MULTILINE)
+    assert source is not None and compiling is not None
+    (tmp_path / "shim.cpp").write_text(source[1])
+    (tmp_path / "mine.h").write_text(_MINE)
+    monkeypatch.chdir(tmp_path)
+    subprocess.run(compiling[1].split(), check=True)
+    assert run(*compiling[2].split()[1:], "--count", "3") == 0
+    assert run(*compiling[2].replace("jacobian", "hessian").split()[1:], "--count", "3") == 1
+
+
+_MINE = """
+#pragma once
+#include <Eigen/Dense>
+#include <Eigen/Sparse>
+#include <vector>
+using Triplets = std::vector<Eigen::Triplet<double>>;
+struct Node { Eigen::Vector3d x; double u, v; int index; };
+inline void add_stretch(const Node &a, const Node &b, double k_s, Eigen::VectorXd &f, Triplets &K) {
+    Eigen::Vector3d e = b.x - a.x;
+    double l = e.norm(), du = b.u - a.u, w = l / du;
+    Eigen::Vector3d d = e / l;
+    Eigen::Matrix3d P = Eigen::Matrix3d::Identity() - d * d.transpose();
+    Eigen::Matrix4d J;
+    J << k_s / l * P - k_s / du * Eigen::Matrix3d::Identity(), k_s * w / du * d,
+        k_s * w / du * d.transpose(), -k_s * w * w / du;
+    Eigen::Vector4d F;
+    F << -k_s * (l - du) / du * d, 0.5 * k_s * (l - du) * (l + du) / (du * du);
+    for (int i = 0; i < 4; i++) {
+        f(5 * a.index + i) -= F(i);
+        f(5 * b.index + i) += F(i);
+        for (int j = 0; j < 4; j++)
+            for (const Node *r : {&a, &b})
+                for (const Node *c : {&a, &b})
+                    K.emplace_back(5 * r->index + i, 5 * c->index + j, r == c ? J(i, j) : -J(i, j));
+    }
+}
+"""
 
 
 def test_the_example_of_the_readme(

@@ -160,15 +160,18 @@ def manner(
     by_name = any(value_of(a) in unknowns for a in named)
     rest = named if by_name else named[1:]
     keywords, positions = {}, []
+    strange = [a.name for a in rest if value_of(a) is None and a.default is a.empty]
+    if strange:
+        few = len(strange) == 1
+        raise InputError(
+            f"{where}: {', '.join(strange)} {'is no unknown or parameter' if few else 'are no unknowns or parameters'} of "
+            f"this energy ({', '.join(values)}); say what {'it is' if few else 'they are'}: "
+            + " ".join(f"--with {name}=FORMULA" for name in strange)
+        )
     for argument in rest:
         meant = value_of(argument)
         if meant is None:
-            if argument.default is not argument.empty:
-                continue
-            raise InputError(
-                f"{where}: {argument.name} is no unknown or parameter of this energy ({', '.join(values)}); "
-                f"say what it is: --with {argument.name}=FORMULA"
-            )
+            continue
         if argument.kind is argument.POSITIONAL_ONLY:
             positions.append(meant)
         else:

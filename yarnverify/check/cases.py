@@ -75,6 +75,12 @@ class Cases:
         parts = np.vstack([self.truth.energy[None], self.truth.gradient, self.truth.hessian.reshape(-1, n)])
         return np.asarray(self.truth.has_derivatives & ~(np.abs(parts) > largest).any(axis=0))
 
+    @property
+    def idle(self) -> Array:
+        """(n,) bool: where the energy, which does not act everywhere, does not act."""
+        nothing = ~(self.truth.hessian != 0).any(axis=(0, 1)) & (self.truth.energy == 0)
+        return np.asarray(nothing & (self.energy.elsewhere == "zero"))
+
     def values(self) -> dict[str, Array]:
         """Unknowns, (3, n) or (n,), and parameters, by name."""
         q = self.points.q

@@ -120,7 +120,8 @@ def _judged(
     for block in blocks:
         diagnosis = judge.diagnosis(block)
         if diagnosis.status in ("wrong", "approximate"):
-            block = narrowed(block, cases, judge.plain & ~np.isinf(block.errors))  # the plainest state shows it best
+            plainest = narrowed(block, cases, judge.plain & ~np.isinf(block.errors))  # shows it best
+            block = block if plainest.passes else plainest
         found.append((block, diagnosis))
         advance("judging", len(cases) + len(blocks))
     checked = Checked(name, cases, convention, found, notes=notes, extra={k: v for k, v in results.extra.items() if v})
@@ -128,7 +129,11 @@ def _judged(
     checked.troubles = _troubles(ran, cases)
     checked.invented = _invented(results, cases, ran)
     if not checked.passes:
-        checked.hints = sign_hints(found, convention) + factor_hints(found, cases)
+
+        def fails(other: Convention) -> int:
+            return sum(not block.passes for block in judged(decoded(ran.flat, other, cases.dof), cases, ran.done))
+
+        checked.hints = sign_hints(found, convention, fails) + factor_hints(found, cases)
         unknown = any(
             (diagnosis.status == "wrong" and not diagnosis.reasons) or diagnosis.status == "no value"
             for _, diagnosis in found

@@ -64,8 +64,14 @@ class Digits:
 
     def loss(self, block: Block, lost: Array) -> str:
         text = f"loses digits {self._places(lost, lambda near, distance: self._law(block, near, distance))}"
-        if "u/angle" in text:
+        if "u/angle^" in text and block.kind != "H":
             text += ": a cosine there holds few digits of the angle; take atan2(sine, cosine)"
+        elif "u/angle^" in text:
+            text += ": large terms cancel there, or the angle comes from a cosine"
+        elif "u/angle" in text:
+            text += (
+                ": what vanishes there is made of rounded directions; take the cross product of the edges themselves"
+            )
         return text
 
     def _law(self, block: Block, at: Array, distance: Array) -> str:

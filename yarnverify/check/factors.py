@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations
@@ -46,19 +46,27 @@ class Factor:
         return Factor(1 / self.number, tuple((name, -power) for name, power in self.powers))
 
 
-def number_text(value: float) -> str:
-    """A number as a small fraction, perhaps of pi, where it is one."""
-    for unit, name in ((1.0, ""), (np.pi, "pi"), (1 / np.pi, "1/pi"), (2**0.5, "sqrt(2)")):
+_UNITS = (
+    (1.0, "", ""), (np.pi, "pi", "pi"), (1 / np.pi, "1/pi", "1/pi"), (2**0.5, "sqrt(2)", "sqrt(2)"),
+    (180 / np.pi, "180/pi", "(180/pi)"), ((180 / np.pi) ** 2, "(180/pi)^2", "(180/pi)**2"),
+)  # fmt: skip
+
+
+def number_text(value: float, expression: bool = False) -> str:
+    """A number as a small fraction, perhaps of pi, where it is one; as an ``expression`` where all its digits are needed."""
+    for unit, name, code in _UNITS:
         nearest = Fraction(value / unit).limit_denominator(24)
         if (
             nearest
-            and abs(float(nearest) * unit / value - 1) < 1e-5
-            and max(abs(nearest.numerator), nearest.denominator) <= 96
+            and abs(float(nearest) * unit / value - 1) < (1e-12 if expression else 1e-5)
+            and max(abs(nearest.numerator), nearest.denominator) <= (96 if unit < 50 else 1)
         ):
             if not name:
                 return str(nearest)
-            return (f"{'-' if nearest < 0 else ''}{name}") if abs(nearest) == 1 else f"{nearest} {name}"
-    return f"{value:.6g}"
+            if abs(nearest) == 1:
+                return f"{'-' if nearest < 0 else ''}{code if expression else name}"
+            return f"{nearest}*{code}" if expression else f"{nearest} {name}"
+    return f"{value:.17g}" if expression else f"{value:.6g}"
 
 
 def quantities(cases: Cases) -> dict[str, Array]:
@@ -78,9 +86,30 @@ def quantities(cases: Cases) -> dict[str, Array]:
         )
     if shape.angle:
         angle = angles(cases)
-        found |= {"angle": angle, "sin(angle)": np.sin(angle), "cos(angle)": np.abs(np.cos(angle))}
+        found |= {
+            "angle": angle,
+            "(pi - angle)": np.pi - angle,
+            "sin(angle)": np.sin(angle),
+            "cos(angle)": np.abs(np.cos(angle)),
+        }
         found |= {"sin(angle/2)": np.sin(angle / 2), "tan(angle/2)": np.tan(angle / 2)}
     return found
+
+
+def curvatures(cases: Cases) -> dict[str, Array]:
+    """What a factor may be made of where another measure stands for the angle, and another length for the yarn's."""
+    found = quantities(cases)
+    if not shape_of(cases.energy).angle:
+        return {}
+    angle = found["angle"]
+    plain = {name: value for name, value in found.items() if "angle" not in name}
+    with np.errstate(all="ignore"):
+        return plain | {
+            "(tan(angle/2)/angle)": np.tan(angle / 2) / angle,
+            "(sin(angle/2)/angle)": np.sin(angle / 2) / angle,
+            "(sin(angle)/angle)": np.sin(angle) / angle,
+            "cos(angle/2)": np.cos(angle / 2),
+        }
 
 
 def _difference(cases: Cases, a: Name, b: Name) -> str:
@@ -151,19 +180,42 @@ def ratio(computed: Array, true: Array, tolerance: float) -> Array | None:
 
 
 def factor(values: Array, named: Mapping[str, Array], tolerance: float) -> Factor | None:
-    """The product that a ratio is at all states, of at most two quantities; None where it is none."""
+    """The product that a ratio is at all states, of at most three quantities; None where it is none."""
     with np.errstate(all="ignore"):
         if _constant(values, tolerance):
             return Factor(float(np.median(values)))
+        if not np.isfinite(values).all() or not (np.all(values > 0) or np.all(values < 0)):
+            return None
         live = {name: value for name, value in named.items() if np.isfinite(value).all() and np.all(value > 0)}
-        single = [(name, power, value.astype(float) ** power) for name, value in live.items() for power in _POWERS]
-        for name, power, value in single:
-            if _constant(values / value, tolerance):
-                return Factor(float(np.median(values / value)), ((name, power),))
-        for (name, power, value), (other, power_, value_) in combinations(single, 2):
-            if name != other and _constant(values / (value * value_), tolerance):
-                return Factor(float(np.median(values / (value * value_))), ((name, power), (other, power_)))
+        names = [(name, power) for name in live for power in _POWERS]
+        if not names:
+            return None
+        logs = np.array([power * np.log(live[name].astype(float)) for name, power in names])
+    target = np.log(np.abs(values))
+    most = 3 if len(values) >= 4 else 2  # fewer states fit a product of three by chance
+    for count in range(1, most + 1):
+        for places in _products(
+            names, logs - logs.mean(axis=1, keepdims=True), target - target.mean(), count, tolerance
+        ):
+            number = values / np.exp(logs[list(places)].sum(axis=0))
+            if _constant(number, tolerance):
+                return Factor(float(np.median(number)), tuple(names[place] for place in places))
     return None
+
+
+def _products(
+    names: list[tuple[str, int]], logs: Array, target: Array, count: int, tolerance: float
+) -> Iterator[tuple[int, ...]]:
+    """Places of ``count`` quantities whose logarithms add up to a target, all less their means."""
+    firsts = list(combinations(range(len(names)), count - 1))
+    for first in firsts:
+        if len({names[place][0] for place in first}) < len(first):
+            continue
+        start = first[-1] + 1 if first else 0
+        gap = np.abs(logs[start:] - (target - logs[list(first)].sum(axis=0))).max(axis=1, initial=0.0)
+        for place in start + np.flatnonzero(gap <= 2 * tolerance):
+            if names[place][0] not in {names[i][0] for i in first}:
+                yield (*first, int(place))
 
 
 def _constant(values: Array, tolerance: float) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -10,12 +11,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from yarnverify.check.cases import Cases, angles
-from yarnverify.check.factors import Factor, factor, quantities, ratio, terms
+from yarnverify.check.factors import Factor, curvatures, factor, number_text, quantities, ratio, terms
 from yarnverify.check.judge import Block
 from yarnverify.symbolic.declare import Energy
 
 Array = NDArray[Any]
 _ROUNDED = (1.57, 1.571, 1.5708, 1.570796)  # what people write for pi/2
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """What a block is instead of what it should be.
+
+    Attributes
+    ----------
+    text
+        In words; empty where nothing was recognised.
+    factor
+        What the truth is multiplied by, where that is all.
+    sign
+        Of the block against the truth: 1 or -1, 0 where it cannot be told.
+    """
+
+    text: str = ""
+    factor: Factor | None = None
+    sign: int = 0
 
 
 class Formula:
@@ -40,39 +60,40 @@ class Formula:
             self._quantities = quantities(self.cases)
         return {name: value[at] for name, value in self._quantities.items()}
 
-    def mistake(self, block: Block, at: Array) -> tuple[str, Factor | None]:
-        """What a block is instead of what it should be, in words; and the factor between the two, if that is all."""
+    def mistake(self, block: Block, at: Array) -> Mistake:
+        """What a block is instead of what it should be; a wrong sign besides another mistake is seen through."""
         computed, true = block.computed[:, at], block.true[:, at]
-        size = np.abs(true).max(axis=0)
+        live = np.abs(true).max(axis=0) > 0
         if not np.any(computed):
-            return "is zero, as if left out", None
-        live = size > 0
+            return Mistake("is zero, as if left out")
         if not live.any():
-            return "is not zero, as it should be", None
+            return Mistake("is not zero, as it should be")
+        where = np.flatnonzero(at)[live]
         found = ratio(computed[:, live], true[:, live], self.tolerance)
         if found is not None:
-            known = factor(found, self.named(np.flatnonzero(at)[live]), self.tolerance)
-            if known is not None:
-                return _factor_text(known), known
-            offset = self._right_angle(found, np.flatnonzero(at)[live]) or self._rounded(
-                found, np.flatnonzero(at)[live]
+            known = factor(found, self.named(where), self.tolerance) or factor(
+                found, {name: value[where] for name, value in curvatures(self.cases).items()}, self.tolerance
             )
-            if offset:
-                return offset, None
-        for test in (
-            self._printed_block,
-            self._transposed,
-            self._other_block,
-            self._first_derivatives,
-            self.definite,
-            self._term,
-        ):
-            text = test(block, at)
-            if text:
-                return text, None
-        if found is not None:
-            return "points the right way but has another size", None
-        return "", None
+            if known is not None:
+                return Mistake(_factor_text(known), known, 1 if known.number > 0 else -1)
+        for sign in (1, -1):
+            if found is not None:
+                text = self._right_angle(sign * found, where) or self._rounded(sign * found, where)
+                if text:
+                    return _signed(text, sign)
+            printed = self._printed_block(block, sign * computed, at)
+            if printed is not None:
+                return printed
+            for test in (self._transposed, self._summand, self._other_block, self._first_derivatives, self.definite):
+                text = test(block, sign * computed, at)
+                if text:
+                    return _signed(text, sign)
+            if found is None and (text := self._term(block, sign * computed, at)):
+                return _signed(text, sign)
+        if found is not None and len(true) > 1:
+            sign = 1 if np.all(found > 0) else -1 if np.all(found < 0) else 0
+            return Mistake(f"points the {'opposite' if sign < 0 else 'right'} way, and has another size", None, sign)
+        return Mistake()
 
     def _same(self, computed: Array, other: Array) -> bool:
         with np.errstate(all="ignore"):
@@ -80,36 +101,53 @@ class Formula:
             size = np.sqrt((other**2).sum(axis=0))
         return bool(np.isfinite(gap).all() and size.any() and np.all(gap <= self.tolerance * size.clip(min=1e-300)))
 
-    def _printed_block(self, block: Block, at: Array) -> str:
+    def _printed_block(self, block: Block, computed: Array, at: Array) -> Mistake | None:
+        """A misprint typed in, perhaps times a number: another sign, a squared time step."""
         printed = self._printed()
         if printed is None or block.kind == "E":
-            return ""
+            return None
         places = dict(self.cases.labels)
         where = tuple(places[name] for name in block.name.split(","))
-        values = printed[block.kind][where].reshape(block.computed.shape[0], -1)
-        if self._same(values[:, at], block.true[:, at]) or not self._same(block.computed[:, at], values[:, at]):
-            return ""
-        return f"is what the document prints, misprint included{equation_of(self.cases.energy, block.name)}"
+        values = printed[block.kind][where].reshape(block.computed.shape[0], -1)[:, at]
+        if self._same(values, block.true[:, at]) or not values.any(axis=0).all():
+            return None
+        found = ratio(computed, values, self.tolerance)
+        known = None if found is None else factor(found, {}, self.tolerance)
+        if known is None or known.number < 0:
+            return None
+        size = "" if abs(known.number - 1) < self.tolerance else f", times {number_text(known.number)}"
+        sign = 1 if np.array_equal(computed, block.computed[:, at]) else -1
+        text = f"is what the document prints, misprint included{equation_of(self.cases.energy, block.name)}{size}"
+        return _signed(text, sign)
 
-    def _transposed(self, block: Block, at: Array) -> str:
+    def _transposed(self, block: Block, computed: Array, at: Array) -> str:
         if block.kind != "H" or block.computed.shape[0] != 9:
             return ""
         turned = block.true.reshape(3, 3, -1).swapaxes(0, 1).reshape(9, -1)
-        for sign, text in ((1, "is transposed"), (-1, "is transposed and has the wrong sign")):
-            if self._same(sign * block.computed[:, at], turned[:, at]):
-                return text
+        return "is transposed" if self._same(computed, turned[:, at]) else ""
+
+    def _others(self, block: Block) -> list[Block]:
+        return [
+            b for b in self.blocks if b.kind == block.kind and b.name != block.name and b.true.shape == block.true.shape
+        ]
+
+    def _summand(self, block: Block, computed: Array, at: Array) -> str:
+        """The blocks of a row add up to zero where a translation changes nothing: a sum from which one was left out."""
+        rest = computed - block.true[:, at]
+        for other in self._others(block):
+            if self._same(rest, other.true[:, at]):
+                return f"lacks minus {_spelled(other.name)}: it is left out of a sum"
+            if self._same(rest, -2 * other.true[:, at]) or self._same(rest, 2 * other.true[:, at]):
+                return f"holds {_spelled(other.name)} with the wrong sign"
         return ""
 
-    def _other_block(self, block: Block, at: Array) -> str:
-        for other in self.blocks:
-            if other.kind == block.kind and other.name != block.name and other.true.shape == block.true.shape:
-                for sign in (1, -1):
-                    if self._same(sign * block.computed[:, at], other.true[:, at]):
-                        what = "is" if sign > 0 else "is minus"
-                        return f"{what} the block {other.name.replace(',', ', ')}: indices are swapped"
+    def _other_block(self, block: Block, computed: Array, at: Array) -> str:
+        for other in self._others(block):
+            if self._same(computed, other.true[:, at]):
+                return f"is the block {_spelled(other.name)}: indices are swapped"
         return ""
 
-    def _first_derivatives(self, block: Block, at: Array) -> str:
+    def _first_derivatives(self, block: Block, computed: Array, at: Array) -> str:
         """The Gauss-Newton part of a law that is quadratic in its measure: g g^T/(2 E)."""
         if block.kind != "H":
             return ""
@@ -118,13 +156,14 @@ class Formula:
         a, b = (gradient[places[name]] for name in block.name.split(","))
         with np.errstate(all="ignore"):
             outer = (a[:, None] * b[None]).reshape(-1, len(self.cases)) / (2 * energy)
-        if not self._same(block.computed[:, at], outer[:, at]):
+        if not self._same(computed, outer[:, at]):
             return ""
         return (
             "holds first derivatives only (Gauss-Newton): the term with the measure's own second derivative is missing"
         )
 
-    def definite(self, block: Block, at: Array) -> str:
+    def definite(self, block: Block, computed: Array, at: Array) -> str:
+        """Whether a Hessian's block is that of the nearest one without negative eigenvalues."""
         if block.kind != "H":
             return ""
         whole = np.moveaxis(self.cases.truth.hessian[..., at], -1, 0)
@@ -132,13 +171,13 @@ class Formula:
         clamped = np.moveaxis((vectors * np.maximum(values, 0)[:, None, :]) @ vectors.swapaxes(1, 2), 0, -1)
         places = dict(self.cases.labels)
         rows, columns = (places[name] for name in block.name.split(","))
-        if not self._same(block.computed[:, at], clamped[rows, columns].reshape(block.computed.shape[0], -1)):
+        if not self._same(computed, clamped[rows, columns].reshape(block.computed.shape[0], -1)):
             return ""
         return "has its negative eigenvalues set to zero: a form for solvers, not the derivative"
 
-    def _term(self, block: Block, at: Array) -> str:
+    def _term(self, block: Block, computed: Array, at: Array) -> str:
         """A difference from the truth that is a multiple of one term of the kind that formulas are made of."""
-        rest = block.computed[:, at] - block.true[:, at]
+        rest = computed - block.true[:, at]
         for name, term in terms(self.cases, rest.shape[0]).items():
             if ratio(rest, term[:, at], self.tolerance) is not None:
                 return f"is off by a multiple of {name}: that term is wrong, or missing"
@@ -162,14 +201,25 @@ class Formula:
         return ""
 
 
+def _signed(text: str, sign: int) -> Mistake:
+    return Mistake(text if sign > 0 else f"{text}, and has the wrong sign", None, sign)
+
+
+def _spelled(name: str) -> str:
+    return name.replace(",", ", ")
+
+
 def _factor_text(found: Factor) -> str:
     if found.is_sign:
         return "has the wrong sign"
-    missing = found.inverse
+    sign = ", and has the wrong sign" if found.number < 0 else ""
+    powers = dict(found.powers)
+    if set(powers) == {"angle", "(pi - angle)"} and powers["angle"] == -powers["(pi - angle)"] < 0:
+        return f"takes pi minus the angle for the angle: its cosine has the wrong sign{sign}"
     if found.powers and abs(abs(found.number) - 1) < 1e-5:
-        sign = ", and has the wrong sign" if found.number < 0 else ""
-        return f"lacks a factor {Factor(abs(missing.number), missing.powers)}{sign}"
-    return f"is {found} times what it should be"
+        return f"lacks a factor {Factor(1.0, found.inverse.powers)}{sign}"
+    degrees = ": an angle in degrees" if "180" in number_text(found.number) and not found.powers else ""
+    return f"is {found} times what it should be{degrees}"
 
 
 def equation_of(energy: Energy, block: str) -> str:

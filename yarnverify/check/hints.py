@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import permutations
 from typing import Any
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from yarnverify.accuracy.shape import shape_of
 from yarnverify.check.cases import Cases
 from yarnverify.check.conventions import Convention, Results, Row, decoded
+from yarnverify.check.factors import number_text
 from yarnverify.check.judge import Block
 from yarnverify.check.recognise import Diagnosis
 
@@ -20,18 +22,52 @@ Found = Sequence[tuple[Block, Diagnosis]]
 _TRIED = 6  # states that an order is tried at
 
 
-def sign_hints(found: Found, convention: Convention) -> list[str]:
-    """``--force`` or ``--jacobian``, where every block of gradient or Hessian has nothing but the wrong sign."""
-    flags = []
-    for kind, flag, taken in (("G", "--force", convention.force), ("H", "--jacobian", convention.jacobian)):
-        wrong = [diagnosis.factor for block, diagnosis in found if block.kind == kind and diagnosis.status == "wrong"]
+def sign_hints(found: Found, convention: Convention, fails: Callable[[Convention], int]) -> list[str]:
+    """``--force`` or ``--jacobian``, where every block whose sign can be told has the other one; else which has which.
+
+    Parameters
+    ----------
+    found, convention
+        What was found under a convention.
+    fails
+        How many blocks fail under another.
+    """
+    flags, texts, turned = [], [], []
+    for kind, flag, taken, words in (
+        ("G", "--force", convention.force, ("gradient", "force")),
+        ("H", "--jacobian", convention.jacobian, ("Hessian", "Jacobian of the force")),
+    ):
         mine = [output for output in convention.outputs if output.kind == kind]
-        if wrong and all(f is not None and f.is_sign for f in wrong):
-            others = sum(block.kind == kind and block.passes and _live(block) for block, _ in found)
-            named = [output.name for output in mine if output.whole]
-            if not others:
-                flags.append(_flag(flag, taken, named))
-    return [f"matches with {' '.join(flags)}"] if flags else []
+        signs = [(block.name, diagnosis.sign) for block, diagnosis in found if block.kind == kind and _live(block)]
+        right = [name for name, sign in signs if sign > 0]
+        opposite = [name for name, sign in signs if sign < 0]
+        if opposite and not right:
+            flags.append(_flag(flag, taken, [output.name for output in mine if output.whole]))
+            turned.append(kind)
+        elif opposite and 2 * len(opposite) >= len(right):
+            forces = taken or any(output.sign < 0 for output in mine)
+            one, other = words[::-1] if forces else words
+            texts.append(
+                f"signs differ from block to block, so that none fits all: {_names(right)} {_have(right)} the sign of the "
+                f"{one}, {_names(opposite)} {_have(opposite)} that of the {other}"
+            )
+    if not flags:
+        return texts
+    outputs = tuple(replace(o, sign=-o.sign) if o.kind in turned else o for o in convention.outputs)
+    left = fails(replace(convention, outputs=outputs))
+    matches = f"matches with {' '.join(flags)}"
+    if left:
+        fail = "block fails" if left == 1 else "blocks fail"
+        matches = f"the signs are right with {' '.join(flags)}; {left} {fail} then, of {len(found)}, for other reasons"
+    return [matches, *texts]
+
+
+def _names(names: list[str]) -> str:
+    return " ".join(names) if len(names) <= 9 else f"{len(names)} blocks"
+
+
+def _have(names: list[str]) -> str:
+    return "has" if len(names) == 1 else "have"
 
 
 def _live(block: Block) -> bool:
@@ -62,10 +98,12 @@ def factor_hints(found: Found, cases: Cases) -> list[str]:
         return [f"{name} is not used: matches with --fix {name}=1"]
     if first.powers:
         return []
-    size = f"{abs(first.number):.17g}"
-    return [
-        f"everything is {texts.pop()} times this energy; if your stiffness means that: --with {name}={name}/({size})"
-    ]
+    size = number_text(abs(first.number), expression=True)
+    size = size if size.isalnum() else f"({size})"
+    only = {block.kind for block, _ in wrong} == {"H"} and any(block.kind != "H" for block, _ in found)
+    if only:
+        return [f"the whole Hessian is {texts.pop()} times what it should be: a time step squared?"]
+    return [f"everything is {texts.pop()} times this energy; if your stiffness means that: --with {name}={name}/{size}"]
 
 
 def orders(convention: Convention, cases: Cases) -> list[tuple[str, tuple[Row, ...]]]:
@@ -119,8 +157,10 @@ def order_hint(
         return []
     for number, (text, rows) in enumerate(candidates):
         part = flat[number * at.size : (number + 1) * at.size]
-        results = decoded(part, _reordered(convention, rows), cases.dof)
-        if _matches(results, cases, at):
+        results = decoded(part, replace(convention, rows=rows), cases.dof)
+        signs = _signs(results, cases, at)
+        if signs:
+            flags = _flags(signs, convention)
             if by_name:
                 pairs = [
                     (old.label, new.label)
@@ -129,37 +169,34 @@ def order_hint(
                 ]
                 named = dict.fromkeys((old.split(".")[0], new.split(".")[0]) for old, new in pairs)
                 renamed = " ".join(f"--with {old}={new}" for old, new in named)
-                return [f"matches with other names: --order {text} {renamed}"]
-            return [f"matches with --order {text}"]
+                return [f"matches with other names: --order {text} {renamed}{flags}"]
+            return [f"matches with --order {text}{flags}"]
     return []
 
 
-def _reordered(convention: Convention, rows: tuple[Row, ...]) -> Convention:
-    return Convention(
-        rows,
-        convention.outputs,
-        convention.force,
-        convention.jacobian,
-        convention.layout,
-        convention.column_major,
-        convention.dtype,
-    )
+def _flags(signs: dict[str, int], convention: Convention) -> str:
+    words = []
+    for kind, flag, taken in (("G", "--force", convention.force), ("H", "--jacobian", convention.jacobian)):
+        if signs.get(kind) == -1:
+            named = [output.name for output in convention.outputs if output.kind == kind and output.whole]
+            words.append(f" {_flag(flag, taken, named)}")
+    return "".join(words)
 
 
-def _matches(results: Results, cases: Cases, at: Array) -> bool:
-    """Whether results are right to six digits, up to a common sign of the gradient and of the Hessian."""
-    seen = False
+def _signs(results: Results, cases: Cases, at: Array) -> dict[str, int]:
+    """The sign under which each output is right to six digits; empty if one is under neither."""
+    found = {}
     for kind, true in (("E", cases.truth.energy), ("G", cases.truth.gradient), ("H", cases.truth.hessian)):
         given = results.given[kind]
         if not given.any():
             continue
         computed, exact = results.part(kind)[given], true[..., at][given]
         scale = np.sqrt((exact**2).sum(axis=0)) if exact.ndim > 1 else np.abs(exact)
-        gaps = []
         for sign in (1, -1):
             gap = sign * computed - exact
-            gaps.append(np.sqrt((gap**2).sum(axis=0)) if gap.ndim > 1 else np.abs(gap))
-        if not any(np.all(gap <= 1e-6 * scale) for gap in gaps):
-            return False
-        seen = True
-    return seen
+            if np.all((np.sqrt((gap**2).sum(axis=0)) if gap.ndim > 1 else np.abs(gap)) <= 1e-6 * scale):
+                found[kind] = sign
+                break
+        else:
+            return {}
+    return found

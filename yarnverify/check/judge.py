@@ -106,7 +106,7 @@ def _block(
     computed = results.part(kind)[place].reshape(-1, n)
     with np.errstate(all="ignore"):
         errors = norm((computed - true) - rest) / np.maximum(norm(true), float(limits.tiny)) / unit
-    errors = np.where(np.isfinite(computed).all(axis=0), errors, np.inf)
+    errors = np.where(np.isfinite(computed).all(axis=0), np.minimum(errors, np.finfo(np.float64).max), np.inf)
     errors = np.where(present & ran, errors, np.nan)
     worst, share, condition = _worst(kind, name, errors, cases)
     error = float(errors[worst]) if errors.size and not np.isnan(errors[worst]) else 0.0

@@ -37,11 +37,14 @@ class Diagnosis:
         Short sentences, the first the most telling; empty where nothing was recognised.
     factor
         What the truth is multiplied by, where that is all.
+    sign
+        Of the block against the truth: 1 or -1, 0 where it cannot be told.
     """
 
     status: Status
     reasons: tuple[str, ...]
     factor: Factor | None = None
+    sign: int = 0
 
 
 class Judge:
@@ -58,20 +61,23 @@ class Judge:
         if not block.judged.any():
             return Diagnosis("not judged", ("nothing came back where there is something to be judged",))
         if block.passes:
-            return Diagnosis("pass", ())
+            return Diagnosis("pass", (), None, 1)
         fails = failing(block, self.cases)
         fails[block.worst] = True
-        broken = np.isinf(block.errors)
+        broken = block.judged & ~np.isfinite(block.computed).all(axis=0)
+        idle = self.cases.idle & fails & ~broken
+        if idle.any():
+            return Diagnosis("wrong", ("is not zero where the energy does not act",))
         plain = self.plain & block.judged
         finite = plain & ~broken
         relative = block.errors * UNIT[self.cases.dtype]
         reasons = []
         if finite.any() and (relative[finite] > 1e-3).any():
-            text, found = self.formula.mistake(block, finite)
-            return Diagnosis("wrong", (text,) if text else (), found)
+            found = self.formula.mistake(block, finite)
+            return Diagnosis("wrong", (found.text,) if found.text else (), found.factor, found.sign)
         middle = float(np.median(relative[finite])) if finite.any() else 0.0
         if middle > _APPROXIMATE * UNIT[self.cases.dtype] and (fails & finite).sum() * 2 > finite.sum():
-            return Diagnosis("approximate", (self.digits.precision(block, finite, middle),))
+            return Diagnosis("approximate", (self.digits.precision(block, finite, middle),), None, 1)
         if not finite.any() and plain.any():
             return Diagnosis("no value", ("is NaN or infinite even where nothing is hard",))
         if broken.any():
@@ -79,7 +85,7 @@ class Judge:
         lost = fails & ~broken
         if lost.any():
             gross = lost & (relative > 1e-3) & self.cases.of_regime("moderate", "near rest", "exact")
-            if gross.any() and (text := self.formula.definite(block, gross)):
-                return Diagnosis("wrong", (text,))
+            if gross.any() and (text := self.formula.definite(block, block.computed[:, gross], gross)):
+                return Diagnosis("wrong", (text,), None, 1)
             reasons.append(self.digits.loss(block, lost))
-        return Diagnosis("loses digits" if lost.any() else "no value", tuple(reasons))
+        return Diagnosis("loses digits" if lost.any() else "no value", tuple(reasons), None, 1)

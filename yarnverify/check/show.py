@@ -151,7 +151,7 @@ def _tables(groups: list[tuple[list[Block], Diagnosis]]) -> None:
             print(f"  {_WORDS[diagnosis.status]:<13}{names(blocks)}")
             for reason in diagnosis.reasons or ([] if worst.passes else ["nothing was recognised"]):
                 print(f"  {'':<13}  {reason}")
-            print(f"  {'':<13}  worst {size(worst.error)} u at K = {size(worst.condition)}, {times(worst)}")
+            print(f"  {'':<13}  {measured(worst)}")
         return
     from rich import box
     from rich.console import Console
@@ -178,6 +178,13 @@ def _tables(groups: list[tuple[list[Block], Diagnosis]]) -> None:
 
 def size(value: float) -> str:
     return f"{value:.3g}"
+
+
+def measured(block: Block) -> str:
+    """The worst error in words."""
+    if not block.passes and not np.any(block.true[:, block.worst]):
+        return "worst where the true value is 0"
+    return f"worst {size(block.error)} u at K = {size(block.condition)}, {times(block)}"
 
 
 def times(block: Block) -> str:
