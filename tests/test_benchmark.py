@@ -157,6 +157,14 @@ def test_peers_give_the_true_values(energy: str, peer: str, declared: dict[str, 
             assert errors.max() < limit, (way.how, output)
 
 
+def test_jax_is_measured_as_people_write_it_too(declared: dict[str, Energy]) -> None:
+    pytest.importorskip("jax", reason="jax is not installed")
+    found = {each.name: each.ways for each in contestants(declared["bending"], ["jax"])[0]}
+    (written,) = found["jax as written"]
+    assert written.how.startswith("jit(vmap(hessian))") and written.hessian == "full"
+    assert written in found["jax"]
+
+
 def ordinary(q: Any, energy: str) -> Any:
     """Elements with segments of length above a half, and sines above 0.3."""
     if energy == "parallel_contact":

@@ -47,7 +47,7 @@ def contestants(
     missing: dict[str, str] = {}
     for name in (*kernels(), *peers):
         try:
-            found.append(_peer(energy, name) if name in peers else _kernel(energy, name, threads))
+            found += _peer(energy, name) if name in peers else [_kernel(energy, name, threads)]
         except ImportError as error:
             missing[name] = f"{error.name or error} is not installed"
         except NotRunError as error:
@@ -94,6 +94,10 @@ def _kernel(energy: Energy, name: str, threads: int) -> Contestant:
     return Contestant(name, "kernel", (way,), ("numba",) if engine else ())
 
 
-def _peer(energy: Energy, name: str) -> Contestant:
+def _peer(energy: Energy, name: str) -> list[Contestant]:
     module: Any = importlib.import_module(f"yarnverify.benchmark.peers.{name}")
-    return Contestant(name, "peer", module.ways(energy), module.PACKAGES)
+    found = [Contestant(name, "peer", module.ways(energy), module.PACKAGES)]
+    if hasattr(module, "AS_WRITTEN"):
+        ways = tuple(way for way in found[0].ways if way.how == module.AS_WRITTEN)
+        found.append(Contestant(f"{name} as written", "peer", ways, module.PACKAGES))
+    return found

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from yarnverify.benchmark.contestants import Contestant, contestants, failure, kernels
+from yarnverify.benchmark.contestants import Contestant, contestants, failure
 from yarnverify.benchmark.inputs import STATES, Inputs, timed_states
 from yarnverify.benchmark.peers import PEERS
 from yarnverify.benchmark.timing import Clock, Spread, paired, speedups, spread, warm
@@ -28,7 +28,7 @@ LONG, LONG_ROUNDS = 1_000_000, 3  # a round at this size takes tens of seconds
 TUNED_AT = 100_000
 MOST_BYTES = 4 * 10**9
 MOST_SECONDS = 5.0  # a call; what would take longer is measured at smaller sizes alone
-BASELINES = ("jax", "lambdify")
+BASELINES = ("jax as written", "jax", "lambdify")
 FLOOR = "memory floor"
 Advance = Callable[[str, int], None]
 
@@ -79,10 +79,10 @@ def benchmark(
     sizes = sorted(set(sizes))
     # one thread waits for nobody, so that its processor time is its wall time less what other programs took
     clock = time.process_time if threads == 1 else time.perf_counter
-    steps = len(chosen) * (len(kernels()) + len(peers) + len(STATES) * len(sizes) + 1)
     with pinned(threads) as processors:
         found = {
-            each.name: _measure(each, sizes, peers, threads, rounds, points, clock, advance, steps) for each in chosen
+            each.name: _measure(each, sizes, peers, threads, rounds, points, clock, advance, len(chosen))
+            for each in chosen
         }
     packages = sorted({package for each in found.values() for package in each.pop("packages")})
     return {
@@ -145,11 +145,12 @@ def _measure(
     points: int,
     clock: Clock,
     advance: Advance,
-    steps: int,
+    energies: int,
 ) -> dict[str, Any]:
     from yarnverify.benchmark.errors import errors_of
 
     able, missing = contestants(energy, peers, threads)
+    steps = energies * (len(able) + len(missing) + len(STATES) * len(sizes) + 1)
     tuned = timed_states(energy, STATES[0], min(max(sizes), TUNED_AT))
     chosen: dict[str, Way] = {}
     for name, reason in missing.items():

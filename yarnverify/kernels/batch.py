@@ -7,6 +7,7 @@ scale far from 1, an error) are taken out by looking at the margins and are done
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, cached_property
@@ -187,10 +188,9 @@ class Batch:
             self._kept = self._kept or self._worker()
             self._some(ranges, self._kept)
             return
-        with ThreadPoolExecutor(self.threads) as pool:
-            shares = [ranges[i :: self.threads] for i in range(self.threads)]
-            for done in [pool.submit(self._some, share) for share in shares]:
-                done.result()
+        shares = [ranges[i :: self.threads] for i in range(self.threads)]
+        for done in [_pool(self.threads).submit(self._some, share) for share in shares]:
+            done.result()
 
     def _worker(self) -> Worker:
         if self.engine == "compiled" and self.kernel.numbers == "float":
@@ -345,6 +345,16 @@ class _Arrays:
         margins, _ = self._by_second(batch.rows.take(at, axis=1), batch.values_at(at), list(part))
         batch.scatter(at, part)
         return margins
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    """Threads that stay, and with them their scratch memory."""
+    return ThreadPoolExecutor(threads, "yarnverify")
+
+
+if hasattr(os, "register_at_fork"):  # a forked process has the pools, but none of their threads
+    os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 @cache

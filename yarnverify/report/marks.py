@@ -29,6 +29,7 @@ _MARKS = {
     "fast compiled": Mark("d", (0, (5, 1.5)), "#E69F00"),
     "lambdify": Mark("<", (0, (4, 3)), "#7F6000"),
     "jax": Mark("P", (0, (2, 2)), "#56B4E9"),
+    "jax as written": Mark(">", (0, (2, 4)), "#56B4E9"),
     "casadi": Mark("X", (0, (6, 3)), "#882255"),
     "numba": Mark("p", (0, (1, 2)), "#117733"),
     "differences": Mark("h", (0, (3, 3)), "#666666"),

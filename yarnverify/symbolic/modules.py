@@ -206,8 +206,6 @@ def proved(energy: Energy, declarations: Declarations) -> Proved:
         shapes = tuple(safe_shapes(derivation))
     for shape in shapes:
         _require_proofs(f"{energy.name}, {shape.shape} shape", shape.check())
-    if shapes and shapes[0].corner is not None:
-        _require_proofs(f"{energy.name}, {shapes[0].shape} shape by translation", shapes[0].moved.check())
     return Proved(derivation, shapes)
 
 
@@ -229,7 +227,7 @@ def derived_programs(energy: Energy, found: Proved, variant: str) -> tuple[list[
     shapes = found.shapes
     if variant == "fast" and shapes[-1].shape == "polar":
         # within rounding of a fold the plain cross product has no direction any more: there, and only there, the exact one
-        first = safe_program(energy, shapes[0].moved, "plain", shapes, guarded=len(shapes) == 1)
+        first = safe_program(energy, shapes[0], "plain", shapes, guarded=len(shapes) == 1)
         return [first, safe_program(energy, shapes[-1], "exact", shapes)], []
     if variant != "accurate":
         return [safe_program(energy, shape, "plain", shapes) for shape in shapes], []

@@ -10,15 +10,14 @@ phi enters the law either as phi or as theta = pi - phi. Two shapes of the same 
 ``polar``   wherever s > 0, by derivatives in phi, with n = m/s, t_a = n x a, t_b = b x n, r = n x v.
 
 Rows of the common point o directly, with the third edge, since translation cancels digits where a yarn is folded onto
-itself:     v = a/la - b/lb,  w = a/la + b/lb,  k = (end_a - end_b)/(la lb);
-or, away from there and for half the operations, as minus the sums of the other rows: by translation.
+itself:     v = a/la - b/lb,  w = a/la + b/lb,  k = (end_a - end_b)/(la lb).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
@@ -84,10 +83,6 @@ class Safe:
         The energy in atoms that are computed without loss.
     given
         Atoms that come from ``kernels.geometry`` instead of from their definitions.
-    slopes
-        How the derivatives of the law are made.
-    by_translation
-        Whether the rows of the common point of a corner are minus the sums of the others.
     """
 
     derivation: Derivation
@@ -98,16 +93,10 @@ class Safe:
     law: Expr
     given: frozenset[Name]
     slopes: dict[str, Any] = field(default_factory=dict)
-    by_translation: bool = False
 
     @property
     def lengths(self) -> tuple[Measure, ...]:
         return tuple(m for m in self.derivation.measures if m.b is None)
-
-    @property
-    def moved(self) -> Safe:
-        """The same with the rows of the common point by translation."""
-        return replace(self, by_translation=True)
 
     def define(self, name: Name, meaning: Expr) -> Expr:
         self.section.definitions[name] = Definition(name, meaning, _NOWHERE)
@@ -291,8 +280,8 @@ class Safe:
         return (*self.lengths, *((self.corner,) if self.corner is not None else ()))
 
     def _is_hub(self, point: Name) -> bool:
-        """Whether translation gives the rows of a point."""
-        return (self.corner is None or self.by_translation) and self.derivation._is_hub(point)
+        """Whether translation may give the rows of a point: never at a corner, where that cancels digits."""
+        return self.corner is None and self.derivation._is_hub(point)
 
     @staticmethod
     def _signed(block: Expr, scale: int) -> Expr:

@@ -30,9 +30,6 @@ Digits: TypeAlias = Literal["plain", "exact", "twice"]
 # How near to 1 the cosine between the edges may come; a yarn folded further has sines whose products may underflow.
 _SMOOTH_UP_TO = 1 - sp.Rational(1, 2**20)
 _PLAIN_DOWN_TO = sp.Rational(1, 2**16)  # sine; a plain cross product keeps some 37 of 53 bits there
-# Edges of lengths l and l' that end nearer to each other than the square root of so many l l': blocks at their common point
-# are so much smaller than the others that their sums cancel more than the condition explains.
-_APART = sp.Rational(1, 8)
 
 
 def safe_program(
@@ -74,9 +71,6 @@ def safe_program(
         checks.append((_symbol(safe.corner.name("size")), level, text))
         if guarded:
             choice = _symbol(safe.corner.name("s")) - _PLAIN_DOWN_TO
-    if safe.corner is not None and safe.by_translation:
-        a, b, cosine = (_symbol(name) for name in (safe.corner.a.l.name, safe.corner.b.l.name, safe.corner.name("C")))
-        choice = sp.Function("select")(choice, a / b + b / a - 2 * cosine - _APART, choice)  # both must be positive
     sums = Sums(energy, safe, reading, digits)
     if choice is not None:
         choice = sums.safe(sp.sympify(choice))  # whether an energy acts is a jump: never a matter of rounding
