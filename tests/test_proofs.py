@@ -527,3 +527,11 @@ $$\mathbf{F}_{\mathbf{x}_2} = \mathbf{F}_{\mathbf{x}_3} \quad (6)$$
     record = proved(hinge)
     assert [c["verdict"] for c in claims(record, "6")] == ["refuted"]
     assert claims(record, "5")[0]["verdict"] in ("proved", "undecided")
+
+
+def test_a_definition_with_a_point_of_its_own_is_refuted_and_what_it_does_at_rest_is_left_out(source: Source) -> None:
+    """The direction of a running index that the section has no point for: its energy has none either."""
+    record = proved(section_of(changed(source, "12", r"\mathbf{d}_2", r"\mathbf{d}_4"), "Bending"))
+    (angle,) = claims(record, "12")
+    assert (angle["verdict"], angle["reason"]) == ("refuted", "differs from the declared one")
+    assert claims(record, "14")[0]["because"] == ["12"]

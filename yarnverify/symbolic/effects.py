@@ -43,12 +43,13 @@ def effect(judged: Judged) -> str | None:
     section = judged.section
     if section.declared is None or not section.declared.rest or judged.kind not in ("jacobian", "force"):
         return None
-    claim = judged.claim
+    claim, witness = judged.claim, judged.finding.witness
+    names = list(witness.state) if witness is not None else judged.court.names  # formulas may have points that energies lack
     before = flint.ctx.prec
     flint.ctx.prec = _REST_BITS
     try:
         for aside in (Fraction(0), _ASIDE):
-            state = _rest(section, judged.court.names, aside)
+            state = _rest(section, names, aside)
             evaluation = Evaluation(section, state, Balls(), judged.court.energy)
             try:
                 true, printed = evaluation.value(claim.left), evaluation.value(claim.right)
