@@ -55,7 +55,7 @@ def write_json(record: Any, target: Path | None) -> bool:
     try:
         target.write_text(json.dumps(record, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     except OSError as error:
-        stop(f"{target}: cannot write: {(error.strerror or str(error)).lower()}")
+        stop(f"{target}: cannot write: {why(error)}")
     return False
 
 
