@@ -90,6 +90,20 @@ def bending_all_signs(q: Any, k_b: Any) -> Any:
     return e, -g, -h
 
 
+def bending_clamped(q: Any, k_b: Any) -> Any:
+    """The energy with a cosine that is kept from 1."""
+    e, _, _ = _of(bending, q, k_b=k_b)
+    theta = np.sqrt(e * (q[9] - q[10]) / k_b)
+    return k_b * np.clip(theta, 1e-3, None) ** 2 / (q[9] - q[10])
+
+
+def shear_short_pi(q: Any, k_x: Any, L: Any) -> Any:
+    """Eleven digits of pi."""
+    a, b = q[3:6] - q[:3], q[6:9] - q[:3]
+    psi = np.arctan2((a * b).sum(axis=0), np.sqrt((np.cross(a, b, axis=0) ** 2).sum(axis=0)))
+    return 0.5 * k_x * L * (psi + (3.1415926535 - np.pi) / 2) ** 2
+
+
 def bending_factor(q: Any, k_b: Any) -> Any:
     e, g, h = _of(bending, q, k_b=k_b)
     g[3:6] *= 2

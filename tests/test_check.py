@@ -119,6 +119,7 @@ def test_single_precision_is_held_to_its_own_unit() -> None:
             "is 4 (u1 - u2) (tan(angle/2)/angle)^2/(|x1 - x0| + |x0 - x2|) times what it should be",
         ),
         ("shear_in_degrees", "is (180/pi)^2 times what it should be: an angle in degrees"),
+        ("shear_short_pi", "takes 1.57079632675 for pi/2"),
         ("bending_single_inside", "is in single precision"),
         ("bending_differences", "digits everywhere: a difference quotient"),
     ],
@@ -134,6 +135,7 @@ def test_mistakes_are_called_by_their_names(name: str, expected: str) -> None:
     [
         ("stretch_definite", "has its negative eigenvalues set to zero"),
         ("bending_zero_where_straight", "loses digits near a straight yarn"),
+        ("bending_clamped", "near a straight yarn (as if the angle never came nearer than 0.001 rad"),
         ("bending_arccos", "is NaN or infinite near a straight yarn"),
         ("bending_arccos", "loses digits near a straight yarn (about u/angle^2)"),
     ],

@@ -183,13 +183,24 @@ class Formula:
                 return f"is off by a multiple of {name}: that term is wrong, or missing"
         return ""
 
+    def rounded_right_angle(self, block: Block, at: Array) -> str:
+        """A right angle in some ten digits, which the energy holds squared."""
+        found = ratio(block.computed[:, at], block.true[:, at], self.tolerance)
+        if found is None or np.any(found < 0):
+            return ""
+        return self._right_angle(np.sqrt(found) if block.kind == "E" else found, np.flatnonzero(at))
+
     def _right_angle(self, found: Array, at: Array) -> str:
         deviation = self.angle[at] - np.pi / 2
         offset = (found - 1) * deviation
         middle = float(np.median(offset))
-        if not np.isfinite(offset).all() or abs(middle) > 0.2 or np.abs(offset - middle).max() > 1e-3 * abs(middle):
+        if (
+            not np.isfinite(offset).all()
+            or not 1e-13 < abs(middle) < 0.2
+            or np.abs(offset - middle).max() > 1e-3 * abs(middle)
+        ):
             return ""
-        return f"takes {np.pi / 2 - middle:.8g} for pi/2"
+        return f"takes {np.pi / 2 - middle:.12g} for pi/2"
 
     def _rounded(self, found: Array, at: Array) -> str:
         """A factor besides a rounded right angle."""

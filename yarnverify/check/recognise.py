@@ -77,7 +77,8 @@ class Judge:
             return Diagnosis("wrong", (found.text,) if found.text else (), found.factor, found.sign)
         middle = float(np.median(relative[finite])) if finite.any() else 0.0
         if middle > _APPROXIMATE * UNIT[self.cases.dtype] and (fails & finite).sum() * 2 > finite.sum():
-            return Diagnosis("approximate", (self.digits.precision(block, finite, middle),), None, 1)
+            text = self.formula.rounded_right_angle(block, finite) or self.digits.precision(block, finite, middle)
+            return Diagnosis("approximate", (text,), None, 1)
         if not finite.any() and plain.any():
             return Diagnosis("no value", ("is NaN or infinite even where nothing is hard",))
         if broken.any():
