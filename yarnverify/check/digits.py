@@ -30,7 +30,10 @@ class Digits:
         if not self.single and np.array_equal(values, values.astype(np.float32).astype(np.float64)) and values.any():
             return "is in single precision"
         if not self.single and 2.0**-27 < middle < 2.0**-17:
-            return "is about as exact as single precision: somewhere a number is float32, or a difference quotient is taken"
+            return (
+                "is about as exact as single precision: somewhere a number is float32, a difference quotient is taken, "
+                "or a small number is added"
+            )
         return f"has about {-np.log10(middle):.0f} digits everywhere: a difference quotient, or a constant that was rounded"
 
     def _special(self) -> list[tuple[str, Array]]:

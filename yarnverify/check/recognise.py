@@ -84,6 +84,12 @@ class Judge:
         if broken.any():
             reasons.append(self.digits.broken(broken))
         lost = fails & ~broken
+        nothing = lost & ~block.computed.any(axis=0) & block.true.any(axis=0)
+        short = self.cases.shorter
+        if nothing.any() and short is not None and not (nothing & ~short).any():
+            return Diagnosis(
+                "wrong", ("is zero where the yarn is shorter than at rest: the energy acts there too",), None, 1
+            )
         if lost.any():
             gross = lost & (relative > 1e-3) & self.cases.of_regime("moderate", "near rest", "exact")
             if gross.any() and (text := self.formula.definite(block, block.computed[:, gross], gross)):
