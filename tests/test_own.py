@@ -335,6 +335,10 @@ MISTAKES = {  # text after the import in line 1, line and column, words
     "zero everywhere": (declared("k * L**2", "elsewhere='zero'"), "2:9", "a domain of one inequality"),
     "no such symbol": (declared("k * L**2", "domain=lambda z: z > 0"), "2:9", "there are x0, x1, k, L"),
     "no inequality": (declared("k * L**2", "domain=lambda L: L"), "2:9", "gives an inequality such as"),
+    "pi in small letters": (declared("k * L**2 * pi"), "4:23", "did you mean PI?"),
+    "a component": (declared("k * L * x0.z"), "4:20", "a component of a point is dot(x0, e), with"),
+    "abs": (declared("k * L * abs(dot(x0, x1))"), "4:20", "length(a) is the size of a number too"),
+    "a branch": (declared("k * max(length(x1 - x0) - L, 0) ** 2"), "4:16", 'elsewhere="zero"): where it acts'),
     "no unknown": ('@energy()\ndef e(*, k: Positive["J"]):\n    return k\n', "3:1", "has no unknown"),
 }
 
