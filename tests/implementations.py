@@ -70,6 +70,23 @@ def stretch_sliding_forces(x0: Any, x1: Any, u0: float, u1: float, ks: float) ->
     return -force, force
 
 
+def _segment(x0: Any, x1: Any, u0: Any, u1: Any, k_s: Any) -> tuple[Any, Any]:
+    """Force on the far end of a segment and of its sliding coordinate, one state or many."""
+    step, du = x1 - x0, u1 - u0
+    length = np.sqrt((step**2).sum(axis=-1))
+    return (-k_s * (length - du) / (du * length))[..., None] * step, 0.5 * k_s * (length - du) * (length + du) / du**2
+
+
+def stretch_forces_in_a_row(x0: Any, x1: Any, u0: Any, u1: Any, k_s: Any) -> Any:
+    force, sliding = _segment(x0, x1, u0, u1, k_s)
+    return -force, force, -sliding, sliding
+
+
+def stretch_forces_by_name(x0: Any, x1: Any, u0: float, u1: float, k_s: float) -> Any:
+    force, sliding = _segment(x0, x1, u0, u1, np.float64(k_s))
+    return {"F_x0": -force, "F_u1": sliding}
+
+
 def bending_of_a_chain(x0: Any, x1: Any, x2: Any, u1: float, u2: float, k_b: float) -> Any:
     """Points in the order of the yarn: the middle one comes second."""
     e, g, h = _of(bending, np.concatenate([x1, x0, x2, [u1, u2]])[:, None], k_b=k_b)
@@ -88,6 +105,20 @@ def bending_force_unsaid(q: Any, k_b: Any) -> Any:
 def bending_all_signs(q: Any, k_b: Any) -> Any:
     e, g, h = _of(bending, q, k_b=k_b)
     return e, -g, -h
+
+
+def bending_clamped(q: Any, k_b: Any) -> Any:
+    """The energy with a cosine that is kept from 1."""
+    e, _, _ = _of(bending, q, k_b=k_b)
+    theta = np.sqrt(e * (q[9] - q[10]) / k_b)
+    return k_b * np.clip(theta, 1e-3, None) ** 2 / (q[9] - q[10])
+
+
+def shear_short_pi(q: Any, k_x: Any, L: Any) -> Any:
+    """Eleven digits of pi."""
+    a, b = q[3:6] - q[:3], q[6:9] - q[:3]
+    psi = np.arctan2((a * b).sum(axis=0), np.sqrt((np.cross(a, b, axis=0) ** 2).sum(axis=0)))
+    return 0.5 * k_x * L * (psi + (3.1415926535 - np.pi) / 2) ** 2
 
 
 def bending_factor(q: Any, k_b: Any) -> Any:
@@ -257,6 +288,28 @@ def parallel_contact_always(u0: float, u1: float, k_c: float, L: float, d: float
     return {"energy": 0.5 * k * gap**2, "force": [k * gap, -k * gap], "jacobian": [[-k, k], [k, -k]]}
 
 
+def parallel_contact_nearer(u0: float, u1: float, k_c: float, L: float, d: float) -> Any:
+    gap = min(u1 - u0 - d / 2, 0.0)
+    return 0.5 * k_c * L * gap**2
+
+
+def shear_of_the_cosine(x0: Any, x1: Any, x3: Any, k_x: float, L: float) -> Any:
+    a, b = (x1 - x0) / np.linalg.norm(x1 - x0), (x3 - x0) / np.linalg.norm(x3 - x0)
+    return float(0.5 * k_x * L * (a @ b) ** 2)
+
+
+def stretch_slack(q: Any, k_s: Any) -> Any:
+    """No resistance to being pushed together."""
+    e, g, h = _of(stretch, q, k_s=k_s)
+    slack = np.sqrt(((q[3:6] - q[:3]) ** 2).sum(axis=0)) < q[7] - q[6]
+    return np.where(slack, 0, e), np.where(slack, 0, g), np.where(slack, 0, h)
+
+
+def bending_doubled_points(x0: Any, x1: Any, x2: Any, u1: float, u2: float, k_b: float) -> Any:
+    force = bending_arccos(x0, x1, x2, u1, u2, k_b)["force"]
+    return {"force": np.concatenate([2 * force[:9], force[9:]])}
+
+
 def stretch_of_nodes(q: Any, k_s: Any) -> Any:
     """Forces and their Jacobian, rows x0, u0, x1, u1."""
     mine = [0, 1, 2, 6, 3, 4, 5, 7]
@@ -346,3 +399,7 @@ def stretch_odd(q: Any, k_s: float) -> Any:
 
 def stretch_stranger(q: Any, youngs: float) -> Any:
     return np.zeros(8)
+
+
+def stretch_named_oddly(q: Any, k_s: float) -> Any:
+    return {"pull": np.zeros(3)}

@@ -72,6 +72,10 @@ def test_kernels_of_the_package_pass(energy: str, variant: str) -> None:
             "stretch_sliding_forces",
             {"returns": ("u0", "u1"), "force": True, "regimes": ("moderate", "sliding", "ratios")},
         ),
+        ("stretch_forces_in_a_row", {"returns": ("F_x0", "F_x1", "F_u0", "F_u1")}),
+        ("stretch_forces_in_a_row", {"layout": "element", "force": True, "returns": ("x0", "x1", "u0", "u1")}),
+        ("stretch_forces_in_a_row", {"force": True}),
+        ("stretch_forces_by_name", {}),
         ("bending_of_a_chain", {"order": "x1,x0,x2,u1,u2", "given": ("x0=x1", "x1=x0")}),
     ],
 )
@@ -118,7 +122,10 @@ def test_single_precision_is_held_to_its_own_unit() -> None:
             "bending_of_curvature",
             "is 4 (u1 - u2) (tan(angle/2)/angle)^2/(|x1 - x0| + |x0 - x2|) times what it should be",
         ),
+        ("shear_of_the_cosine", "lacks a factor |angle - pi/2|^2/cos(angle)^2"),
+        ("parallel_contact_nearer", "is right for 1/2 d in place of d"),
         ("shear_in_degrees", "is (180/pi)^2 times what it should be: an angle in degrees"),
+        ("shear_short_pi", "takes 1.57079632675 for pi/2"),
         ("bending_single_inside", "is in single precision"),
         ("bending_differences", "digits everywhere: a difference quotient"),
     ],
@@ -132,8 +139,10 @@ def test_mistakes_are_called_by_their_names(name: str, expected: str) -> None:
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
+        ("stretch_slack", "wrong: E[]: is zero where the yarn is shorter than at rest: the energy acts there too"),
         ("stretch_definite", "has its negative eigenvalues set to zero"),
         ("bending_zero_where_straight", "loses digits near a straight yarn"),
+        ("bending_clamped", "near a straight yarn (as if the angle never came nearer than 0.001 rad"),
         ("bending_arccos", "is NaN or infinite near a straight yarn"),
         ("bending_arccos", "loses digits near a straight yarn (about u/angle^2)"),
     ],
@@ -200,6 +209,18 @@ def test_no_sign_fits_blocks_that_differ_even_where_all_fail() -> None:
         "signs differ from block to block, so that none fits all: x0 x1 x2 have the sign of the gradient, u1 u2 have that of "
         "the force"
     ]
+
+
+def test_not_everything_is_doubled_where_the_rest_only_loses_digits() -> None:
+    found = checked("bending_doubled_points")
+    assert "wrong: G[x0] G[x1] G[x2]: is 2 times what it should be" in said(found) and not found.hints
+
+
+def test_names_that_a_function_gives_and_nobody_knows() -> None:
+    with pytest.raises(
+        InputError, match=r"implementations.py:stretch_named_oddly returns: 'pull' is no output; there are"
+    ):
+        checked("stretch_named_oddly", regimes=ONE)
 
 
 def test_a_force_where_there_should_be_none() -> None:

@@ -163,6 +163,11 @@ def signed(x0: Point, x1: Point, x2: Point, x3: Point, *, k: Positive["N m"]):
     n1, n2 = cross(e, x2 - x0), cross(x3 - x0, e)
     return k * atan2(dot(cross(n1, n2), e) / length(e), dot(n1, n2)) ** 2 / 2
 '''
+KINDS["fan"] = """
+@energy
+def fan(x0: Point, x1: Point, x2: Point, x3: Point, *, k: Positive["N m"], a: Real["rad"]):
+    return k / 2 * ((angle(x1 - x0, x2 - x0) - a) ** 2 + angle(x2 - x0, x3 - x0) ** 2)  # x1 and x3 do not feel each other
+"""
 KINDS["strain"] = """
 @energy()
 def strain(u0: Sliding, u1: Sliding, *, k: Positive["N"], L: Positive["m"]):
@@ -203,7 +208,7 @@ def test_kernels_of_any_energy_agree_with_ball_arithmetic(kinds: Path, name: str
 def test_what_an_energy_promises_is_what_it_can_keep(kinds: Path) -> None:
     promises = {name: kernel("accurate", name, kinds).KERNEL.promise for name in KINDS}
     expected = {"hinge": "none", "spring": "units", "torsion": "condition", "barrier": "none", "fibre": "none"}
-    expected |= {"signed": "none", "strain": "none"}
+    expected |= {"signed": "none", "strain": "none", "fan": "none"}
     assert promises == expected
 
 
@@ -297,7 +302,7 @@ def test_a_folder_without_a_document_has_nothing_to_prove(kinds: Path, run: Any)
         status == 2 and "has no document with numbered formulas to prove; its energies: yarnverify report kinds" in err
     )
     status, _, err = run("derive", "kinds/sprong")
-    assert status == 2 and "no energy 'sprong' is declared in kinds; there are: barrier, fibre" in err
+    assert status == 2 and "no energy 'sprong' is declared in kinds; there are: barrier, fan, fibre" in err
 
 
 # -- mistakes ---------------------------------------------------------------------------------------------------------
@@ -330,6 +335,10 @@ MISTAKES = {  # text after the import in line 1, line and column, words
     "zero everywhere": (declared("k * L**2", "elsewhere='zero'"), "2:9", "a domain of one inequality"),
     "no such symbol": (declared("k * L**2", "domain=lambda z: z > 0"), "2:9", "there are x0, x1, k, L"),
     "no inequality": (declared("k * L**2", "domain=lambda L: L"), "2:9", "gives an inequality such as"),
+    "pi in small letters": (declared("k * L**2 * pi"), "4:23", "did you mean PI?"),
+    "a component": (declared("k * L * x0.z"), "4:20", "a component of a point is dot(x0, e), with"),
+    "abs": (declared("k * L * abs(dot(x0, x1))"), "4:20", "length(a) is the size of a number too"),
+    "a branch": (declared("k * max(length(x1 - x0) - L, 0) ** 2"), "4:16", 'elsewhere="zero"): where it acts'),
     "no unknown": ('@energy()\ndef e(*, k: Positive["J"]):\n    return k\n', "3:1", "has no unknown"),
 }
 

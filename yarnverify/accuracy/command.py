@@ -28,7 +28,11 @@ def sweep(
     """The record of a sweep; what an interrupted run of the same sweep has finished is not worked out again."""
     units, missing = plan(PROFILES[profile], energies, variants, of.folder if of.own else None)
     if not units:
-        made = f"; they are made by: {of.command('yarnverify generate')}" if of.own else ""
+        made = (
+            f"; they are made by: {of.command('yarnverify generate')}"
+            if of.own and "no such kernel" in str(missing)
+            else ""
+        )
         raise NotRunError(f"no kernels to measure: {'; '.join(missing)}{made}")
     folder = state or state_folder(units)
     try:

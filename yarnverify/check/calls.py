@@ -260,11 +260,17 @@ def flattened(value: Any, layout: str, n: int, what: str) -> Array:
     return np.ascontiguousarray(np.moveaxis(array, axis, 0).reshape(n, -1), dtype=np.float64)
 
 
-def guessed(parts: Sequence[tuple[str, int]], rows: int, function: str) -> list[str] | None:
+def guessed(
+    parts: Sequence[tuple[str, int]], rows: int, function: str, pieces: Sequence[tuple[str, int]]
+) -> list[str] | None:
     """Names for the parts of an answer that have none, by their sizes; None where a size means nothing.
 
-    A function that calls itself a force, and gives no energy, gives forces.
+    A function that calls itself a force, and gives no energy, gives forces. Parts of the sizes of all unknowns in order, the
+    ``pieces``, points among them, are the blocks of these.
     """
+    sizes = [size for name, size in parts if name.startswith("#")]
+    if len(parts) > 1 and len(sizes) == len(parts) and sizes == [size for _, size in pieces] and 3 in sizes:
+        return [f"F_{label}" if "force" in function.lower() else label for label, _ in pieces]
     words = function.lower()
     forces = "force" in words and not any(size == 1 for _, size in parts)
     found = []

@@ -76,6 +76,17 @@ class Cases:
         return np.asarray(self.truth.has_derivatives & ~(np.abs(parts) > largest).any(axis=0))
 
     @property
+    def shorter(self) -> Array | None:
+        """(n,) bool: where the only edge is no longer than the only difference of sliding coordinates; None without these."""
+        shape = shape_of(self.energy)
+        if len(shape.edges) != 1 or len(shape.sliding) != 2:
+            return None
+        rows, q = dict(self.labels), self.points.q
+        edge = q[rows[shape.edges[0].head.label]] - q[rows[shape.edges[0].tail.label]]
+        first, second = (q[rows[name.label].start] for name in shape.sliding)
+        return np.asarray(np.sqrt((edge**2).sum(axis=0)) <= np.abs(second - first))
+
+    @property
     def idle(self) -> Array:
         """(n,) bool: where the energy, which does not act everywhere, does not act."""
         nothing = ~(self.truth.hessian != 0).any(axis=(0, 1)) & (self.truth.energy == 0)

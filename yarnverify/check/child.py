@@ -103,7 +103,7 @@ def run_python(task: Task) -> None:
                     raise ValueError("; ".join(wrong))
                 return names
             raise ValueError(f"it gives {len(sizes)} results, and --returns names {len(said)}")
-        names_or_none = guessed(sizes, rows, name)
+        names_or_none = guessed(sizes, rows, name, task.task["pieces"])
         if names_or_none is None or len(set(names_or_none)) < len(names_or_none):
             shown = ", ".join(str(size) for _, size in sizes)
             raise ValueError(f"results of {shown} numbers for a state of {rows}: say what they are with --returns")

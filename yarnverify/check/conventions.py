@@ -167,7 +167,9 @@ def size(rows: slice) -> int:
     return int(rows.stop - rows.start)
 
 
-def output_named(text: str, convention: Convention, labels: Sequence[tuple[str, slice]]) -> Output | None:
+def output_named(
+    text: str, convention: Convention, labels: Sequence[tuple[str, slice]], where: str = "--returns"
+) -> Output | None:
     """An output by name, None for ``_``.
 
     Raises
@@ -186,10 +188,19 @@ def output_named(text: str, convention: Convention, labels: Sequence[tuple[str, 
         return Output(text, kind, sign, () if kind == "E" else every, every if kind == "H" else ())
     places = dict(labels)
     parts = [part.strip() for part in re.split(r"[,:]", text)]
+    for pattern, kind in (
+        (r"f_?(.+)", "G"),
+        (r"df_?(.+?)_?/?d_?(.+)", "H"),
+    ):  # as the document writes forces: F_x1, dF_x1/du1
+        found = re.fullmatch(pattern, text, re.IGNORECASE)
+        if found is not None and all(name in places for name in found.groups()):
+            blocks = [_rows_of(convention, places[name]) for name in found.groups()]
+            return Output(text, kind, -1, blocks[0], blocks[1] if kind == "H" else (), False)
     if len(parts) > 2 or any(part not in places for part in parts):
         raise InputError(
-            f"--returns: {text!r} is no output; there are energy, gradient or force, hessian or jacobian, blocks of the "
-            f"gradient such as {next(iter(places))}, blocks of the Hessian such as {text_pair(places)}, and _ to pass one over"
+            f"{where}: {text!r} is no output; there are energy, gradient or force, hessian or jacobian, blocks of the gradient "
+            f"such as {next(iter(places))} or of the force such as F_{next(iter(places))}, blocks of the Hessian such as "
+            f"{text_pair(places)} or of the Jacobian such as dF_{text_pair(places).replace(',', '/d')}, and _ to pass one over"
         )
     rows = [_rows_of(convention, places[part]) for part in parts]
     if len(parts) == 1:

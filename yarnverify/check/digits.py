@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from yarnverify.accuracy.metrics import UNIT
 from yarnverify.accuracy.shape import shape_of
 from yarnverify.check.cases import Cases, angles
-from yarnverify.check.factors import goes_on
+from yarnverify.check.factors import goes_on, ratio
 from yarnverify.check.judge import Block
 
 Array = NDArray[Any]
@@ -30,7 +30,10 @@ class Digits:
         if not self.single and np.array_equal(values, values.astype(np.float32).astype(np.float64)) and values.any():
             return "is in single precision"
         if not self.single and 2.0**-27 < middle < 2.0**-17:
-            return "is about as exact as single precision: somewhere a number is float32, or a difference quotient is taken"
+            return (
+                "is about as exact as single precision: somewhere a number is float32, a difference quotient is taken, "
+                "or a small number is added"
+            )
         return f"has about {-np.log10(middle):.0f} digits everywhere: a difference quotient, or a constant that was rounded"
 
     def _special(self) -> list[tuple[str, Array]]:
@@ -75,7 +78,10 @@ class Digits:
         return text
 
     def _law(self, block: Block, at: Array, distance: Array) -> str:
-        """How the error grows, where it follows a power of the distance."""
+        """How the error grows, where it follows a power of the distance; or where the angle stops."""
+        stops = self._stops(block, at, distance)
+        if stops:
+            return stops
         saturated = block.errors * UNIT[self.cases.dtype] > 0.01  # nothing left to lose
         at = at & ~saturated & (block.errors > 16) & (distance > 1e-15)
         if at.sum() < 5:
@@ -85,3 +91,20 @@ class Digits:
         if power not in (1, 2, 3) or abs(slope - power) > 0.35:
             return ""
         return f" (about u/angle{'^' + str(power) if power > 1 else ''})"
+
+    def _stops(self, block: Block, at: Array, distance: Array) -> str:
+        """What a threshold does: nothing comes within it, or the angle stays at it, so that the error is a power."""
+        at = at & (block.errors * UNIT[self.cases.dtype] > 1e-3) & (distance > 0) & block.true.any(axis=0)
+        if at.sum() < 3 or np.ptp(np.log10(distance[at])) < 1:
+            return ""
+        if not block.computed[:, at].any():
+            return f" (is zero within {distance[at].max():.1g} rad)"
+        found = ratio(block.computed[:, at], block.true[:, at], 0.05)
+        if found is None or np.any(found < 0):
+            return ""
+        for power in (1, -1, 2, -2):
+            limits = (found * distance[at] ** power) ** (1 / power)
+            middle = float(np.median(limits))
+            if np.all(np.abs(limits - middle) < 0.05 * middle):
+                return f" (as if the angle never came nearer than {middle:.2g} rad: its cosine is clamped)"
+        return ""

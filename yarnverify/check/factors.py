@@ -92,6 +92,8 @@ def quantities(cases: Cases) -> dict[str, Array]:
             "sin(angle)": np.sin(angle),
             "cos(angle)": np.abs(np.cos(angle)),
         }
+        if not goes_on(cases):  # the right angle is the rest
+            found["|angle - pi/2|"] = np.abs(angle - np.pi / 2)
         found |= {"sin(angle/2)": np.sin(angle / 2), "tan(angle/2)": np.tan(angle / 2)}
     return found
 

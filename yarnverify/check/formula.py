@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from yarnverify.accuracy.shape import shape_of
+from yarnverify.accuracy.truth import truth
 from yarnverify.check.cases import Cases, angles
 from yarnverify.check.factors import Factor, curvatures, factor, number_text, quantities, ratio, terms
 from yarnverify.check.judge import Block
 from yarnverify.symbolic.declare import Energy
 
 Array = NDArray[Any]
+_MULTIPLES = (2.0, 0.5, 4.0, 0.25, np.pi, 1 / np.pi)
 _ROUNDED = (1.57, 1.571, 1.5708, 1.570796)  # what people write for pi/2
 
 
@@ -54,6 +57,7 @@ class Formula:
         self.tolerance = 1e-3 if cases.dtype == "float32" else 1e-6
         self.angle = angles(cases)
         self._quantities: dict[str, Array] | None = None
+        self._others_known: dict[tuple[str, float], dict[tuple[str, str], Array]] = {}
 
     def named(self, at: Array) -> dict[str, Array]:
         if self._quantities is None:
@@ -84,7 +88,14 @@ class Formula:
             printed = self._printed_block(block, sign * computed, at)
             if printed is not None:
                 return printed
-            for test in (self._transposed, self._summand, self._other_block, self._first_derivatives, self.definite):
+            for test in (
+                self._transposed,
+                self._summand,
+                self._other_block,
+                self._parameter,
+                self._first_derivatives,
+                self.definite,
+            ):
                 text = test(block, sign * computed, at)
                 if text:
                     return _signed(text, sign)
@@ -147,6 +158,33 @@ class Formula:
                 return f"is the block {_spelled(other.name)}: indices are swapped"
         return ""
 
+    def _parameter(self, block: Block, computed: Array, at: Array) -> str:
+        """A length, such as a distance of contact, that is a multiple of what it should be."""
+        for name in shape_of(self.cases.energy).lengths:
+            for size in _MULTIPLES:
+                if self._same(computed, self._with(name, size)[block.kind, block.name][:, at]):
+                    return f"is right for {number_text(size)} {name} in place of {name}"
+        return ""
+
+    def _with(self, name: str, size: float) -> dict[tuple[str, str], Array]:
+        """Every block with one parameter multiplied."""
+        if (name, size) not in self._others_known:
+            points = self.cases.points
+            changed = {**points.parameters, name: points.parameters[name] * size}
+            known = truth(self.cases.energy, replace(points, parameters=changed))
+            whole, n, places = (
+                {"E": known.energy[None], "G": known.gradient, "H": known.hessian},
+                len(points),
+                dict(self.cases.labels),
+            )
+            self._others_known[name, size] = {
+                (b.kind, b.name): whole[b.kind][
+                    tuple(places[part] for part in b.name.split(",") if part) or ...
+                ].reshape(-1, n)
+                for b in self.blocks
+            }
+        return self._others_known[name, size]
+
     def _first_derivatives(self, block: Block, computed: Array, at: Array) -> str:
         """The Gauss-Newton part of a law that is quadratic in its measure: g g^T/(2 E)."""
         if block.kind != "H":
@@ -183,13 +221,24 @@ class Formula:
                 return f"is off by a multiple of {name}: that term is wrong, or missing"
         return ""
 
+    def rounded_right_angle(self, block: Block, at: Array) -> str:
+        """A right angle in some ten digits, which the energy holds squared."""
+        found = ratio(block.computed[:, at], block.true[:, at], self.tolerance)
+        if found is None or np.any(found < 0):
+            return ""
+        return self._right_angle(np.sqrt(found) if block.kind == "E" else found, np.flatnonzero(at))
+
     def _right_angle(self, found: Array, at: Array) -> str:
         deviation = self.angle[at] - np.pi / 2
         offset = (found - 1) * deviation
         middle = float(np.median(offset))
-        if not np.isfinite(offset).all() or abs(middle) > 0.2 or np.abs(offset - middle).max() > 1e-3 * abs(middle):
+        if (
+            not np.isfinite(offset).all()
+            or not 1e-13 < abs(middle) < 0.2
+            or np.abs(offset - middle).max() > 1e-3 * abs(middle)
+        ):
             return ""
-        return f"takes {np.pi / 2 - middle:.8g} for pi/2"
+        return f"takes {np.pi / 2 - middle:.12g} for pi/2"
 
     def _rounded(self, found: Array, at: Array) -> str:
         """A factor besides a rounded right angle."""

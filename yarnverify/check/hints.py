@@ -85,7 +85,7 @@ def _flag(flag: str, taken: bool, named: list[str]) -> str:
 def factor_hints(found: Found, cases: Cases) -> list[str]:
     """Another meaning of the stiffness, where everything is off by the same factor."""
     wrong = [(block, diagnosis) for block, diagnosis in found if diagnosis.status == "wrong"]
-    right = [block for block, _ in found if block.passes and _live(block)]
+    right = [block for block, diagnosis in found if diagnosis.status != "wrong" and diagnosis.sign and _live(block)]
     if right or not wrong or any(diagnosis.factor is None for _, diagnosis in wrong):
         return []
     texts = {str(diagnosis.factor).lstrip("-") for _, diagnosis in wrong}

@@ -77,12 +77,19 @@ class Judge:
             return Diagnosis("wrong", (found.text,) if found.text else (), found.factor, found.sign)
         middle = float(np.median(relative[finite])) if finite.any() else 0.0
         if middle > _APPROXIMATE * UNIT[self.cases.dtype] and (fails & finite).sum() * 2 > finite.sum():
-            return Diagnosis("approximate", (self.digits.precision(block, finite, middle),), None, 1)
+            text = self.formula.rounded_right_angle(block, finite) or self.digits.precision(block, finite, middle)
+            return Diagnosis("approximate", (text,), None, 1)
         if not finite.any() and plain.any():
             return Diagnosis("no value", ("is NaN or infinite even where nothing is hard",))
         if broken.any():
             reasons.append(self.digits.broken(broken))
         lost = fails & ~broken
+        nothing = lost & ~block.computed.any(axis=0) & block.true.any(axis=0)
+        short = self.cases.shorter
+        if nothing.any() and short is not None and not (nothing & ~short).any():
+            return Diagnosis(
+                "wrong", ("is zero where the yarn is shorter than at rest: the energy acts there too",), None, 1
+            )
         if lost.any():
             gross = lost & (relative > 1e-3) & self.cases.of_regime("moderate", "near rest", "exact")
             if gross.any() and (text := self.formula.definite(block, block.computed[:, gross], gross)):

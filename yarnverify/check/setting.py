@@ -95,8 +95,9 @@ class Setting:
         )
         self.given = assignments(options.given, "--with")
 
-    def outputs(self, names: Sequence[str]) -> tuple[Output, ...]:
-        found = [output_named(name, self.convention, self.cases.labels) for name in names]
+    def outputs(self, names: Sequence[str], where: str = "--returns") -> tuple[Output, ...]:
+        """Outputs by name; ``where`` they are named, for messages."""
+        found = [output_named(name, self.convention, self.cases.labels, where) for name in names]
         return tuple(output for output in found if output is not None)
 
     @property

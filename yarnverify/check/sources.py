@@ -55,6 +55,7 @@ def called(
         "arguments": setting.parameters,
         "returns": [output.name for output in known] if library else returns,
         "sizes": {output.name: output.size for output in known},
+        "pieces": [(label, rows.stop - rows.start) for label, rows in setting.cases.labels],
         "layout": options.layout,
         "dtype": setting.cases.dtype,
     }
@@ -62,7 +63,9 @@ def called(
     if ran.decided is None:
         return ran, None, None
     convention = replace(
-        setting.convention, outputs=setting.outputs(ran.decided["returns"]), layout=ran.decided["layout"]
+        setting.convention,
+        outputs=setting.outputs(ran.decided["returns"], "--returns" if options.returns else f"{target} returns"),
+        layout=ran.decided["layout"],
     )
     if not options.returns and not library:
         notes.append(f"taken as: {', '.join(ran.decided['returns'])}; called with {_manner(ran.decided['layout'])}")

@@ -148,7 +148,7 @@ class System:
 
     def evaluate(self, Q: Array, definite: bool = False) -> Evaluation:
         """All at once."""
-        total, force = self._work(Q), float(np.abs(self.loads).max(initial=0.0))
+        total, force = self._work(Q), float(np.maximum.reduce(np.abs(self.loads), initial=0.0))
         slope, sums = np.zeros(self.size), self.pattern.zero()
         for term, number, part, q in self.calls.chunks(self.terms, Q):
             places = self.pattern.places[number]

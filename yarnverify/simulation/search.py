@@ -54,6 +54,7 @@ class Search:
     _lowest_energy: float = np.inf
     _energy: float = np.inf
     _residual: float = np.inf
+    _extent: float = 0.0
     _step: float = np.inf
     _stale: int = 0
     _fulls: int = 0
@@ -95,7 +96,8 @@ class Search:
                                        value.gradient, left)  # fmt: skip
                 continue
             rough = factor is None  # a step of the semi-definite form
-            value, factor = value._replace(matrix=_NOTHING), None  # their memory goes before that of the next comes
+            # the memory of matrix and factor goes before that of the next ones comes
+            value, factor = Evaluation(value.energy, value.gradient, _NOTHING, value.force), None
             progress |= size < 0.5 * self._step
             self._step = min(size, self._step)
             self._stale = 0 if progress or self.searching else self._stale + 1
@@ -115,6 +117,7 @@ class Search:
         self.Q, self._next = Q, None
         self._energy, self._step, self._stale, self._fulls = np.inf, np.inf, 0, 0
         self._residual, self.searching = np.inf, searches
+        self._extent = float(np.ptp(Q))
 
     def _return(self, value: Evaluation, residual: float) -> None:
         self._note(value, residual, 0.0, "return")
@@ -140,7 +143,7 @@ class Search:
 
     def _explained(self, value: Evaluation, residual: float, size: float) -> bool:
         """Whether the coordinates cannot be told any better: the step or the residual is what rounding them makes of it."""
-        extent = float(np.maximum.reduce(self.Q) - np.minimum.reduce(self.Q))
+        extent = self._extent
         if size <= self.options.step * extent:
             return True
         # a soft direction may go to and fro with rounding for ever

@@ -25,7 +25,8 @@ def _powers(*values: int) -> Dimension:
 NUMBER = _powers(0, 0, 0)
 _UNITS = {
     "1": NUMBER, "rad": NUMBER, "kg": _powers(1, 0, 0), "m": _powers(0, 1, 0), "s": _powers(0, 0, 1),
-    "N": _powers(1, 1, -2), "J": _powers(1, 2, -2), "Pa": _powers(1, -1, -2), "Hz": _powers(0, 0, -1),
+    "N": _powers(1, 1, -2), "J": _powers(1, 2, -2), "Pa": _powers(1, -1, -2), "W": _powers(1, 2, -3),
+    "Hz": _powers(0, 0, -1),
 }  # fmt: skip
 _FACTOR = re.compile(r"([A-Za-z]+|1)(?:\^(-?\d+))?\Z")
 

@@ -136,11 +136,20 @@ class Components(Reading):
             label = block_of(expr).replace("/", "_")
             if not self.forces:  # the formulas are those of the gradient and the Hessian
                 label = label.replace("dF_", "h_").replace("_d", "_").replace("F_", "g_")
-            value = self.value(self.formulas[expr], self.block)
+            value = _in_shape(self.value(self.formulas[expr], self.block), expr)
             if expr.op == "derivative" and expr.args[0].name == expr.name and expr.name.bold:
                 value = [[value[min(i, j)][max(i, j)] for j in range(3)] for i in range(3)]  # symmetric: one triangle
             self._blocks[expr] = self._named(value, label)
         return self._blocks[expr]
+
+
+def _in_shape(value: Value, expr: Expr) -> Value:
+    """A force or Jacobian whose formula is a bare 0, as a vector or matrix where it is one, so that it can be added."""
+    names = [expr.args[0].name, expr.name] if expr.op == "derivative" else [expr.name]
+    if not isinstance(value, list):
+        for name in reversed(names):
+            value = [value] * 3 if name.bold else value
+    return value
 
 
 @dataclass(frozen=True)

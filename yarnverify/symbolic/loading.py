@@ -68,9 +68,14 @@ def _told(error: Exception) -> str:
     """What an exception says, in one line, and what to do about the usual ones."""
     text = " ".join(str(error).split())
     if isinstance(error, NameError) and error.name:
-        near = difflib.get_close_matches(error.name, {*FUNCTIONS, *_ANNOTATIONS}, 1)
-        advice = f"did you mean {near[0]}?" if near else f"formulas have the functions {', '.join(FUNCTIONS)}"
+        known = {name.lower(): name for name in (*FUNCTIONS, *_ANNOTATIONS, "PI")}
+        near = difflib.get_close_matches(error.name.lower(), known, 1)
+        advice = f"did you mean {known[near[0]]}?" if near else f"formulas have the functions {', '.join(FUNCTIONS)}"
         return f"{text}; import it from yarnverify.symbolic.declare, or: {advice}"
+    if isinstance(error, AttributeError) and error.name in ("x", "y", "z"):
+        return f'{text}; a component of a point is dot(x0, e), with a parameter e: Vector["1"]'
+    if "abs()" in text:
+        return f"{text}; length(a) is the size of a number too"
     if Expr.__name__ in text or "ufunc" in text:
         return (
             f"{text}; a formula is no number: use the functions of yarnverify.symbolic.declare, {', '.join(FUNCTIONS)}"

@@ -58,7 +58,10 @@ class Inequality:
     right: Expr
 
     def __bool__(self) -> bool:
-        raise TypeError("write a chain such as a > b > c, or a and b, as a list: [a > b, b > c]")
+        raise TypeError(
+            "write a chain such as a > b > c, or a and b, as a list: [a > b, b > c]; in place of if, max and min in a formula, "
+            'give @energy(domain=..., elsewhere="zero"): where it acts, and nothing elsewhere'
+        )
 
 
 @dataclass(frozen=True, slots=True)
