@@ -42,7 +42,7 @@ def settle_files(folder: Path, texts: dict[str, str], check: bool, stale: list[s
     again
         The command that writes them.
     """
-    from yarnverify.errors import NotRunError
+    from yarnverify.errors import NotRunError, why
 
     outcome = Outcome()
     for name, text in texts.items():

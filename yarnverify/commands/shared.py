@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from cyclopts import Parameter
 
+from yarnverify.errors import why
+
 if TYPE_CHECKING:
     from yarnverify.generation import Outcome
 

@@ -44,7 +44,9 @@ def effect(judged: Judged) -> str | None:
     if section.declared is None or not section.declared.rest or judged.kind not in ("jacobian", "force"):
         return None
     claim, witness = judged.claim, judged.finding.witness
-    names = list(witness.state) if witness is not None else judged.court.names  # formulas may have points that energies lack
+    names = (
+        list(witness.state) if witness is not None else judged.court.names
+    )  # formulas may have points that energies lack
     before = flint.ctx.prec
     flint.ctx.prec = _REST_BITS
     try:
