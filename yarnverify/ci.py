@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from yarnverify.errors import NotRunError
+from yarnverify.errors import NotRunError, why
 from yarnverify.show import mistakes, tally_lines
 
 
@@ -198,4 +198,4 @@ def write(record: dict[str, Any], path: str, junit_file: Path | None, summary_fi
         try:
             target.write_text(make(record, path), encoding="utf-8")
         except OSError as error:
-            raise NotRunError(f"{target}: cannot write: {(error.strerror or str(error)).lower()}") from None
+            raise NotRunError(f"{target}: cannot write: {why(error)}") from None

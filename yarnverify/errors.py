@@ -14,3 +14,8 @@ class InputError(Exception):
 
 class NotRunError(Exception):
     """Something was asked for that could not run here."""
+
+
+def why(error: OSError) -> str:
+    """The system's reason, as the end of a line: ``permission denied``."""
+    return (error.strerror or str(error)).lower()

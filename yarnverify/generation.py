@@ -42,7 +42,7 @@ def settle_files(folder: Path, texts: dict[str, str], check: bool, stale: list[s
     again
         The command that writes them.
     """
-    from yarnverify.errors import NotRunError
+    from yarnverify.errors import NotRunError, why
 
     outcome = Outcome()
     for name, text in texts.items():
@@ -64,7 +64,7 @@ def settle_files(folder: Path, texts: dict[str, str], check: bool, stale: list[s
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(text.encode("utf-8"))
         except OSError as error:
-            raise NotRunError(f"{path}: cannot write: {(error.strerror or str(error)).lower()}") from None
+            raise NotRunError(f"{path}: cannot write: {why(error)}") from None
         outcome.lines.append(f"{name}: written")
     for name in stale:
         outcome.differs |= check

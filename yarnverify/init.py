@@ -7,7 +7,7 @@ from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from yarnverify.errors import InputError, NotRunError
+from yarnverify.errors import InputError, NotRunError, why
 
 _START = Path(__file__).parent / "start"
 
@@ -38,5 +38,5 @@ def init(folder: Path) -> list[str]:
             path.write_text(templates.get_template(template).render(name=name), encoding="utf-8")
             lines.append(f"{path}: written")
     except OSError as error:
-        raise NotRunError(f"{folder}: cannot write: {(error.strerror or str(error)).lower()}") from None
+        raise NotRunError(f"{folder}: cannot write: {why(error)}") from None
     return [*lines, f"Next: yarnverify report {folder}"]

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import NoReturn
 
-from yarnverify.errors import InputError
+from yarnverify.errors import InputError, why
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def load(path: Path) -> Source:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise InputError(f"cannot read the document: {(error.strerror or str(error)).lower()}", (name, 1, 1)) from None
+        raise InputError(f"cannot read the document: {why(error)}", (name, 1, 1)) from None
     data = data.removeprefix(b"\xef\xbb\xbf")  # byte order mark
     try:
         text = data.decode("utf-8")

@@ -8,7 +8,7 @@ from typing import Any
 
 from yarnverify.accuracy.record import grown, make_record, missed_targets, read_record, record_text
 from yarnverify.accuracy.sweep import PROFILES, executor_named, finish, plan, run, state_folder
-from yarnverify.errors import InputError, NotRunError
+from yarnverify.errors import InputError, NotRunError, why
 from yarnverify.generation import Outcome
 from yarnverify.project import Project, project
 
@@ -88,7 +88,7 @@ def accuracy(
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(record_text(record), encoding="utf-8")
         except OSError as error:
-            raise NotRunError(f"{path}: cannot write: {(error.strerror or str(error)).lower()}") from None
+            raise NotRunError(f"{path}: cannot write: {why(error)}") from None
         outcome.lines.append(f"{path}: written")
     outcome.lines += [*record["not_run"], *problems]
     outcome.differs = bool(problems)

@@ -13,7 +13,7 @@ from typing import Any
 
 from yarnverify.accuracy.cells import Unit
 from yarnverify.accuracy.sweep import Profile
-from yarnverify.errors import InputError
+from yarnverify.errors import InputError, why
 
 WORSE = 2.0  # a tolerated growth of an error
 _ONE = 1.0  # an error of up to one unit is as good as none
@@ -62,7 +62,7 @@ def read_record(path: Path) -> dict[str, Any]:
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
+        reason = why(error)
         raise InputError(f"{path}: {reason}; the same command with --write instead of --check makes it") from None
     except ValueError as error:
         raise InputError(f"{path}: is not JSON: {error}") from None

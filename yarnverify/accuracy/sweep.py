@@ -17,7 +17,7 @@ from typing import Any
 
 from yarnverify.accuracy.cells import Unit, declared_energy, has_kernel, run_unit
 from yarnverify.accuracy.regimes import curves, not_drawn, regimes
-from yarnverify.errors import InputError, NotRunError
+from yarnverify.errors import InputError, NotRunError, why
 from yarnverify.library import cache_folder, derivations, fingerprint
 from yarnverify.symbolic.declare import load_declarations
 
@@ -225,4 +225,4 @@ def _remember(state: Path, unit: Unit, result: dict[str, Any]) -> None:
         draft.write_text(json.dumps({"unit": asdict(unit), "result": result}), encoding="utf-8")
         draft.replace(path)  # a file is either whole or not there
     except OSError as error:
-        raise NotRunError(f"{path}: cannot write: {(error.strerror or str(error)).lower()}") from None
+        raise NotRunError(f"{path}: cannot write: {why(error)}") from None

@@ -15,7 +15,7 @@ from yarnverify.analysis.moduli import compliance, moduli, stiffness
 from yarnverify.analysis.spectra import FAMILIES, Family, at_rest, sign_map
 from yarnverify.analysis.steps import conditions, stabilities
 from yarnverify.analysis.vibrations import Compared, modes, observed_order, pinned_yarn, tight_net
-from yarnverify.errors import NotRunError
+from yarnverify.errors import NotRunError, why
 
 COMMAND = "yarnverify analyse --write"
 YARN_SIZES, NET_SIZES, CONDITION_SIZES = (10, 20, 40, 80), (6, 12, 24, 48), (8, 16, 32)
@@ -62,7 +62,7 @@ def write(record: dict[str, Any], out: Path) -> str:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     except OSError as error:
-        raise NotRunError(f"{path}: cannot write: {(error.strerror or str(error)).lower()}") from None
+        raise NotRunError(f"{path}: cannot write: {why(error)}") from None
     return f"{path}: written; its page and pictures: yarnverify report --pictures"
 
 

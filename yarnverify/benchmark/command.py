@@ -9,7 +9,7 @@ from typing import Any
 
 from yarnverify.benchmark.peers import PEERS
 from yarnverify.benchmark.run import ROUNDS, SIZES, benchmark
-from yarnverify.errors import InputError, NotRunError
+from yarnverify.errors import InputError, NotRunError, why
 
 
 def measure(
@@ -98,5 +98,5 @@ def _writing(folder: Path) -> Callable[..., Any]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder}: cannot write: {(error.strerror or str(error)).lower()}") from None
+        raise InputError(f"{folder}: cannot write: {why(error)}") from None
     return write

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from yarnverify.check.conventions import ALIASES, Convention
-from yarnverify.errors import InputError, NotRunError
+from yarnverify.errors import InputError, NotRunError, why
 
 Array = NDArray[Any]
 KINDS = (".json", ".npz", ".csv")
@@ -95,7 +95,7 @@ def write_inputs(
             )
             path.write_text(text.getvalue(), encoding="utf-8")
     except OSError as error:
-        raise NotRunError(f"{path}: cannot write: {(error.strerror or str(error)).lower()}") from None
+        raise NotRunError(f"{path}: cannot write: {why(error)}") from None
 
 
 def write_npz(path: Path, arrays: Mapping[str, Array]) -> None:
@@ -151,7 +151,7 @@ def read_results(
             return _read_csv(path, returns, n)
         found = _read_npz(path) if kind == ".npz" else _read_json(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot read: {(error.strerror or str(error)).lower()}") from None
+        raise InputError(f"{path}: cannot read: {why(error)}") from None
     given = str(found.pop("key", key))
     if given != key:
         raise InputError(

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from cyclopts import Parameter
 
+from yarnverify.errors import why
+
 if TYPE_CHECKING:
     from yarnverify.generation import Outcome
 
@@ -55,7 +57,7 @@ def write_json(record: Any, target: Path | None) -> bool:
     try:
         target.write_text(json.dumps(record, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     except OSError as error:
-        stop(f"{target}: cannot write: {(error.strerror or str(error)).lower()}")
+        stop(f"{target}: cannot write: {why(error)}")
     return False
 
 

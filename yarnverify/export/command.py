@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from yarnverify.check.cases import energy_named
-from yarnverify.errors import InputError, NotRunError
+from yarnverify.errors import InputError, NotRunError, why
 from yarnverify.export.formulas import latex_text
 from yarnverify.export.vectors import golden_vectors
 from yarnverify.export.writing import c_header, c_test, json_text, mat, npz
@@ -63,6 +63,6 @@ def export(
             out.mkdir(parents=True, exist_ok=True)
             (out / file).write_bytes(data)
         except OSError as error:
-            raise NotRunError(f"{out / file}: cannot write: {(error.strerror or str(error)).lower()}") from None
+            raise NotRunError(f"{out / file}: cannot write: {why(error)}") from None
         lines.append(f"{out / file}: {meaning}")
     return lines

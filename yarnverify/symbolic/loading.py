@@ -8,7 +8,7 @@ import traceback
 from pathlib import Path
 from typing import Any
 
-from yarnverify.errors import InputError
+from yarnverify.errors import InputError, why
 from yarnverify.symbolic.dimensions import DimensionError, check_dimensions, dimension_of_unit
 from yarnverify.symbolic.energies import Declarations, Energy, Motion, Quantity
 from yarnverify.symbolic.formulas import FUNCTIONS
@@ -55,7 +55,7 @@ def _run(path: Path) -> dict[str, Any]:
     except SyntaxError as error:
         raise InputError(error.msg, (str(path), error.lineno or 1, error.offset or 1)) from None
     except OSError as error:
-        raise InputError(f"cannot read it: {(error.strerror or str(error)).lower()}", (str(path), 1, 1)) from None
+        raise InputError(f"cannot read it: {why(error)}", (str(path), 1, 1)) from None
     except Exception as error:
         frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
         line, column = (frames[-1].lineno, frames[-1].colno) if frames else (1, 0)
