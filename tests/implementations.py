@@ -87,6 +87,11 @@ def stretch_forces_by_name(x0: Any, x1: Any, u0: float, u1: float, k_s: float) -
     return {"F_x0": -force, "F_u1": sliding}
 
 
+def gravity_by_name(x0: Any, x1: Any, u0: float, u1: float, rho: float, g: Any) -> Any:
+    force, per_length = rho * (u1 - u0) / 2 * g, rho * (g @ (x0 + x1)) / 2
+    return {"V": -(u1 - u0) * per_length, "F": np.concatenate([force, force, [-per_length, per_length]])}
+
+
 def bending_of_a_chain(x0: Any, x1: Any, x2: Any, u1: float, u2: float, k_b: float) -> Any:
     """Points in the order of the yarn: the middle one comes second."""
     e, g, h = _of(bending, np.concatenate([x1, x0, x2, [u1, u2]])[:, None], k_b=k_b)
@@ -303,6 +308,11 @@ def stretch_slack(q: Any, k_s: Any) -> Any:
     e, g, h = _of(stretch, q, k_s=k_s)
     slack = np.sqrt(((q[3:6] - q[:3]) ** 2).sum(axis=0)) < q[7] - q[6]
     return np.where(slack, 0, e), np.where(slack, 0, g), np.where(slack, 0, h)
+
+
+def gravity_upwards(x0: Any, x1: Any, u0: float, u1: float, rho: float, g: Any) -> Any:
+    force = gravity_by_name(x0, x1, u0, u1, rho, g)["F"]
+    return {"F": np.concatenate([force[:6], -force[6:]])}
 
 
 def bending_doubled_points(x0: Any, x1: Any, x2: Any, u1: float, u2: float, k_b: float) -> Any:

@@ -76,6 +76,7 @@ def test_kernels_of_the_package_pass(energy: str, variant: str) -> None:
         ("stretch_forces_in_a_row", {"layout": "element", "force": True, "returns": ("x0", "x1", "u0", "u1")}),
         ("stretch_forces_in_a_row", {"force": True}),
         ("stretch_forces_by_name", {}),
+        ("gravity_by_name", {"regimes": ONE}),
         ("bending_of_a_chain", {"order": "x1,x0,x2,u1,u2", "given": ("x0=x1", "x1=x0")}),
     ],
 )
@@ -124,6 +125,7 @@ def test_single_precision_is_held_to_its_own_unit() -> None:
         ),
         ("shear_of_the_cosine", "lacks a factor |angle - pi/2|^2/cos(angle)^2"),
         ("parallel_contact_nearer", "is right for 1/2 d in place of d"),
+        ("gravity_upwards", "wrong: G[u0] G[u1]: has the wrong sign"),
         ("shear_in_degrees", "is (180/pi)^2 times what it should be: an angle in degrees"),
         ("shear_short_pi", "takes 1.57079632675 for pi/2"),
         ("bending_single_inside", "is in single precision"),
@@ -331,7 +333,7 @@ def test_nothing_came_back() -> None:
         ("libnowhere.so", {"energy": "bending"}, InputError, "say which function"),
         ("numpy", {}, InputError, "say which energy with --energy; there are bending"),
         ("x.py:f", {"energy": "bent"}, InputError, "bent: no such energy; there are bending"),
-        ("x.py:f", {"energy": "gravity"}, InputError, "g is a vector"),
+        (f"{ZOO}:gravity_by_name", {"fix": ("g=1",)}, InputError, "--fix g: is a vector"),
     ],
 )
 def test_what_cannot_be_checked_says_why(

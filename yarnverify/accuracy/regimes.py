@@ -134,7 +134,7 @@ def placed(
             found[head] = found[tail] + step
     for name in shape.points:
         found.setdefault(name.label, draw.uniform(-1, 1, (3, n)))
-    return found | _scalars(shape, draw, n, slide)
+    return _scalars(shape, draw, n, slide) | found
 
 
 def _scalars(shape: Shape, draw: Draw, n: int, slide: Array | float = 1.0) -> dict[str, Array]:
@@ -146,6 +146,9 @@ def _scalars(shape: Shape, draw: Draw, n: int, slide: Array | float = 1.0) -> di
     }
     for parameter in shape.energy.parameters:
         name = parameter.label
+        if parameter.name.bold:
+            found[name] = draw.uniform(-1, 1, (3, n))
+            continue
         found[name] = draw.uniform(0.5, 2.0, n)
         if name in shape.lengths:
             found[name] = found[name] * 0.2 + 0.9  # not below the distances that rest compares them with

@@ -45,7 +45,7 @@ class Points:
     q
         (dof, n), float64; float32 values are doubles too.
     parameters
-        Name to (n,), in the order of the declaration.
+        Name to (n,), or (3, n) of a vector, in the order of the declaration.
     """
 
     q: Array
@@ -56,10 +56,10 @@ class Points:
 
     def rows(self) -> Array:
         """``q`` and the parameters below it: (dof + parameters, n)."""
-        return np.vstack([self.q, *(value[None, :] for value in self.parameters.values())])
+        return np.vstack([self.q, *(np.atleast_2d(value) for value in self.parameters.values())])
 
     def take(self, index: Any) -> Points:
-        return Points(self.q[:, index], {name: value[index] for name, value in self.parameters.items()})
+        return Points(self.q[:, index], {name: value[..., index] for name, value in self.parameters.items()})
 
 
 @dataclass(frozen=True)

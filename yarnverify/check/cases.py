@@ -79,7 +79,7 @@ class Cases:
     def shorter(self) -> Array | None:
         """(n,) bool: where the only edge is no longer than the only difference of sliding coordinates; None without these."""
         shape = shape_of(self.energy)
-        if len(shape.edges) != 1 or len(shape.sliding) != 2:
+        if vector_parameters(self.energy) or len(shape.edges) != 1 or len(shape.sliding) != 2:
             return None
         rows, q = dict(self.labels), self.points.q
         edge = q[rows[shape.edges[0].head.label]] - q[rows[shape.edges[0].tail.label]]
@@ -130,8 +130,7 @@ class Cases:
                     for change in (-1, 1):
                         moved = rows.copy()
                         moved[row] *= 1 + change * len(rows) * AMPLIFIED * UNIT[self.dtype]
-                        names = list(self.points.parameters)
-                        points = Points(moved[: self.dof], dict(zip(names, moved[self.dof :], strict=True)))
+                        points = _from_rows(moved, self.points)
                         found |= (truth(self.energy, points).hessian != 0).any(axis=(0, 1)) != acts
             self._known["jumps"] = found
         return self._known["jumps"]
@@ -144,23 +143,32 @@ def declared(folder: Path) -> tuple[Energy, ...]:
 
 
 def energy_named(name: str, folder: Path | None) -> Energy:
-    """The declared energy of a name, with scalar parameters.
+    """The declared energy of a name.
 
     Raises
     ------
     InputError
-        Where none has that name, or a parameter is a vector.
+        Where none has that name.
     """
     there = declared(folder or derivations())
     energy = next((energy for energy in there if energy.name == name), None)
     if energy is None:
         raise InputError(f"{name}: no such energy; there are {', '.join(energy.name for energy in there)}")
-    vectors = [str(parameter.name) for parameter in energy.parameters if parameter.name.bold]
-    if vectors:
-        raise InputError(
-            f"{name}: {', '.join(vectors)} is a vector; only energies with scalar parameters have hard cases"
-        )
     return energy
+
+
+def vector_parameters(energy: Energy) -> list[str]:
+    """Names of the parameters that are vectors."""
+    return [parameter.label for parameter in energy.parameters if parameter.name.bold]
+
+
+def _from_rows(rows: Array, like: Points) -> Points:
+    """Points from their coordinates and parameters, one below the other."""
+    parameters, at = {}, len(like.q)
+    for name, value in like.parameters.items():
+        parameters[name] = rows[at : at + 3] if value.ndim == 2 else rows[at]
+        at += 3 if value.ndim == 2 else 1
+    return Points(rows[: len(like.q)], parameters)
 
 
 @cache
@@ -197,6 +205,8 @@ def hard_cases(
     """
     energy = energy_named(name, folder)
     there = regimes(energy)
+    if vector_parameters(energy):  # what is hard about a vector is not known
+        there = tuple(regime for regime in there if regime.name == "moderate")
     unknown = [w for w in wanted if w not in [regime.name for regime in there]]
     if unknown:
         raise InputError(
@@ -205,7 +215,7 @@ def hard_cases(
     chosen = [r for r in there if (r.name in wanted if wanted else extreme or r.name not in EXTREME)]
     parts = [points_of(energy, regime, dtype, count, SEED) for regime in chosen]
     tags = tuple(f"{regime.name} {i}" for regime in chosen for i in range(count))
-    parameters = {key: np.concatenate([part.parameters[key] for part in parts]) for key in parts[0].parameters}
+    parameters = {key: np.concatenate([part.parameters[key] for part in parts], axis=-1) for key in parts[0].parameters}
     points = Points(np.hstack([part.q for part in parts]), parameters)
     return settled(energy, points, tags, dtype, dict(fixed))
 
@@ -216,6 +226,8 @@ def settled(energy: Energy, points: Points, tags: tuple[str, ...], dtype: str, f
     for key, value in fixed.items():
         if key not in names:
             raise InputError(f"--fix {key}: {energy.name} has the parameters {', '.join(names)}")
+        if points.parameters[key].ndim == 2:
+            raise InputError(f"--fix {key}: is a vector, and no one number")
         if not np.isfinite(value):
             raise InputError(f"--fix {key}={value}: give a finite number")
     values = {key: np.full(len(points), float(np.dtype(dtype).type(value))) for key, value in fixed.items()}
@@ -227,7 +239,7 @@ def settled(energy: Energy, points: Points, tags: tuple[str, ...], dtype: str, f
 def angles(cases: Cases) -> Array:
     """(n,) the angle between the first two edges, to some 1e-16, in plain arithmetic; NaN for an energy without angle."""
     shape = shape_of(cases.energy)
-    if not shape.angle:
+    if not shape.angle or vector_parameters(cases.energy):
         return np.full(len(cases), np.nan)
     rows = dict(cases.labels)
     with np.errstate(all="ignore"):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.check.cases import Cases
+from yarnverify.check.cases import Cases, vector_parameters
 from yarnverify.check.conventions import Convention, Results, decoded
 from yarnverify.check.hints import factor_hints, order_hint, sign_hints
 from yarnverify.check.judge import Block, judged, narrowed
@@ -95,6 +95,8 @@ def check(
     values = setting.values()
     q = setting.states(values)
     notes: list[str] = []
+    if vector_parameters(setting.cases.energy):
+        notes.append("no hard cases: what is hard about a vector is not known, and so all states are moderate")
     run_again = None
     if target is not None:
         ran, convention, run_again = called(target, setting, options, q, values, notes, advance)

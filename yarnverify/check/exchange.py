@@ -86,10 +86,21 @@ def write_inputs(
         else:
             text = io.StringIO()
             writer = csv.writer(text, lineterminator="\n")
-            writer.writerow([*convention.labels, *values])
+            columns = [
+                f"{name}.{axis}" if axis else name
+                for name, v in values.items()
+                for axis in ("xyz" if v.ndim == 2 else ("",))
+            ]
+            writer.writerow([*convention.labels, *columns])
             writer.writerows(
                 [
-                    [repr(float(x)) for x in (*row, *(value[at] for value in values.values()))]
+                    [
+                        repr(float(x))
+                        for x in (
+                            *row,
+                            *np.concatenate([np.atleast_1d(value[at]) for value in values.values()] or [row[:0]]),
+                        )
+                    ]
                     for at, row in enumerate(q)
                 ]
             )

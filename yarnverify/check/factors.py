@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.accuracy.shape import shape_of
+from yarnverify.accuracy.shape import Edge, shape_of
 from yarnverify.check.cases import Cases, angles
 from yarnverify.symbolic.tree import Name
 
@@ -73,11 +73,11 @@ def quantities(cases: Cases) -> dict[str, Array]:
     """What a factor may be made of, at every state: parameters, lengths, differences of sliding coordinates, the angle."""
     shape = shape_of(cases.energy)
     rows = dict(cases.labels)
-    found: dict[str, Array] = dict(cases.points.parameters)
-    for edge in shape.edges:
+    found: dict[str, Array] = {name: value for name, value in cases.points.parameters.items() if value.ndim == 1}
+    for edge in _edges(cases):
         difference = cases.points.q[rows[edge.head.label]] - cases.points.q[rows[edge.tail.label]]
         found[f"|{edge.head.label} - {edge.tail.label}|"] = np.sqrt((difference**2).sum(axis=0))
-    if len(shape.edges) == 2:  # what stands in for the rest length in other discretisations
+    if len(_edges(cases)) == 2:  # what stands in for the rest length in other discretisations
         first, second = (name for name in found if name.startswith("|"))
         found[f"({first} + {second})"] = found[first] + found[second]
     for a, b in combinations(shape.sliding, 2):
@@ -96,6 +96,12 @@ def quantities(cases: Cases) -> dict[str, Array]:
             found["|angle - pi/2|"] = np.abs(angle - np.pi / 2)
         found |= {"sin(angle/2)": np.sin(angle / 2), "tan(angle/2)": np.tan(angle / 2)}
     return found
+
+
+def _edges(cases: Cases) -> list[Edge]:
+    """The edges between unknown points; others go to a point that is a parameter."""
+    rows = dict(cases.labels)
+    return [edge for edge in shape_of(cases.energy).edges if edge.head.label in rows and edge.tail.label in rows]
 
 
 def curvatures(cases: Cases) -> dict[str, Array]:
@@ -135,7 +141,7 @@ def terms(cases: Cases, size: int) -> dict[str, Array]:
         return {}
     common = shape.edges[0].tail if shape.edges else None
     directions: dict[str, Array] = {}
-    for edge in shape.edges:
+    for edge in _edges(cases):
         step = cases.points.q[rows[edge.head.label]] - cases.points.q[rows[edge.tail.label]]
         far = edge.tail if edge.head == common else edge.head
         with np.errstate(all="ignore"):

@@ -97,7 +97,12 @@ def _state(checked: Checked, at: int) -> dict[str, Any]:
         for axis in (("x", "y", "z") if rows.stop - rows.start == 3 else ("",))
     ]
     values = dict(zip(labels, cases.points.q[:, at].tolist(), strict=True))
-    values |= {name: float(value[at]) for name, value in cases.points.parameters.items()}
+    for name, value in cases.points.parameters.items():
+        values |= (
+            dict(zip((f"{name}.{axis}" for axis in "xyz"), value[:, at], strict=True))
+            if value.ndim == 2
+            else {name: float(value[at])}
+        )
     return {"tag": cases.tags[at], "state": {name: float(value).hex() for name, value in values.items()}}
 
 
