@@ -309,6 +309,19 @@ def test_a_wrong_definition_explains_its_consequences(source: Source) -> None:
     assert claims(record, "14")[0]["reason"] == "follows from equation (12)"
 
 
+@pytest.mark.parametrize("angle", [r"(-\mathbf{d}_1^T \mathbf{d}_4", r"(\mathbf{d}_1^T \mathbf{d}_1"])
+def test_an_angle_of_another_point_or_that_is_zero_explains_its_consequences(source: Source, angle: str) -> None:
+    text = changed(source, "12", r"(-\mathbf{d}_1^T \mathbf{d}_2", angle)
+    record = proved(section_of(text, "Bending"))
+    assert {c["verdict"] for c in record["claims"]} == {"proved", "refuted"}
+    assert {c["equation"] for c in record["claims"] if c["verdict"] == "refuted" and not c["because"]} == {
+        "12",
+        "18",
+        "21",
+    }
+    assert all(c["because"] == ["12"] for c in record["claims"] if c["because"])
+
+
 @pytest.mark.parametrize(
     ("title", "equation", "old", "new", "change"),
     [
