@@ -284,7 +284,7 @@ def test_a_full_disk_is_one_error(tmp_path: Path, swing: Path) -> None:
     ]
     ended = subprocess.run(command, capture_output=True, text=True, preexec_fn=full, timeout=60)
     assert ended.returncode == 3 and ended.stderr.count("\n") == 1
-    assert "File too large" in ended.stderr and not list((tmp_path / "out").rglob("*.part*"))
+    assert "file too large" in ended.stderr and not list((tmp_path / "out").rglob("*.part*"))
 
 
 def test_a_run_without_solution_tells_where_its_last_good_state_is(tmp_path: Path, swing: Path) -> None:

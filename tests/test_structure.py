@@ -37,7 +37,15 @@ def outside(names: set[str], allowed: tuple[str, ...]) -> set[str]:
 RULES = [
     (
         "analysis",
-        ("numpy", "scipy", "yarnverify.analysis", "yarnverify.errors", "yarnverify.kernels", "yarnverify.simulation"),
+        (
+            "numpy",
+            "scipy",
+            "yarnverify.analysis",
+            "yarnverify.errors",
+            "yarnverify.files",
+            "yarnverify.kernels",
+            "yarnverify.simulation",
+        ),
     ),
     ("kernels", ("numpy", "yarnverify.kernels")),
     ("report", ("jinja2", "markupsafe", "latex2mathml", "matplotlib", "yarnverify.report")),
@@ -51,6 +59,7 @@ RULES = [
             "PIL",
             "imageio_ffmpeg",
             "yarnverify.errors",
+            "yarnverify.files",
             "yarnverify.simulation",
         ),
     ),

@@ -125,7 +125,7 @@ def test_an_interrupted_run_goes_on_where_it_stopped(units: list[Unit], text: st
     with pytest.raises(KeyboardInterrupt):
         run(units, None, tmp_path, work=stops)
     assert len(list(tmp_path.glob("*.json"))) == 5
-    (tmp_path / "half.tmp").write_text("{", encoding="utf-8")  # what a killed writer leaves
+    (tmp_path / ".half.1.part.json").write_text("{", encoding="utf-8")  # what a killed writer leaves
     seen: list[str] = []
     results = run(units, None, tmp_path, lambda label, total: seen.append(label), goes_on)
     assert sorted(done) == sorted(unit.name for unit in units) == sorted(seen)

@@ -490,7 +490,7 @@ def test_a_full_disk_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.M
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("os.fsync", full)
-    with pytest.raises(NotRunError, match=r"run_00001.vtp cannot be written: No space left on device"):
+    with pytest.raises(NotRunError, match=r"run_00001.vtp: cannot write: no space left on device"):
         series.write(0.1, cloth.Q)
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
 

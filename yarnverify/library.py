@@ -12,11 +12,13 @@ import re
 import sys
 import tomllib
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from yarnverify.errors import InputError
+from yarnverify.errors import InputError, NotRunError
+from yarnverify.files import write_text
 
 MAIN_DOCUMENT = "cirio2014.md"
 _DISPLAY = re.compile(r"\$\$(.*?)\$\$", re.DOTALL)
@@ -222,10 +224,5 @@ def recall(key: str) -> dict[str, Any] | None:
 def remember(key: str, record: Any) -> None:
     """Store a result; where the cache cannot be written, the next run works it out again."""
     path = cache_folder() / f"{key}.json"
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        draft = path.with_suffix(f".{os.getpid()}.tmp")
-        draft.write_text(json.dumps({"key": key, "record": record}), encoding="utf-8")
-        draft.replace(path)
-    except OSError:
-        return
+    with suppress(NotRunError):
+        write_text(json.dumps({"key": key, "record": record}), path)

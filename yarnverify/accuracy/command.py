@@ -8,7 +8,8 @@ from typing import Any
 
 from yarnverify.accuracy.record import grown, make_record, missed_targets, read_record, record_text
 from yarnverify.accuracy.sweep import PROFILES, executor_named, finish, plan, run, state_folder
-from yarnverify.errors import InputError, NotRunError, why
+from yarnverify.errors import InputError, NotRunError
+from yarnverify.files import write_text
 from yarnverify.generation import Outcome
 from yarnverify.project import Project, project
 
@@ -84,11 +85,7 @@ def accuracy(
     if known is not None:
         problems += grown(known, record, whole=not part)
     if write:
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(record_text(record), encoding="utf-8")
-        except OSError as error:
-            raise NotRunError(f"{path}: cannot write: {why(error)}") from None
+        write_text(record_text(record), path)
         outcome.lines.append(f"{path}: written")
     outcome.lines += [*record["not_run"], *problems]
     outcome.differs = bool(problems)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.metadata
 import json
 import multiprocessing
-import os
 import re
 import signal
 from collections.abc import Callable, Iterator, Sequence
@@ -17,7 +16,8 @@ from typing import Any
 
 from yarnverify.accuracy.cells import Unit, declared_energy, has_kernel, run_unit
 from yarnverify.accuracy.regimes import curves, not_drawn, regimes
-from yarnverify.errors import InputError, NotRunError, why
+from yarnverify.errors import InputError, NotRunError
+from yarnverify.files import write_text
 from yarnverify.library import cache_folder, derivations, fingerprint
 from yarnverify.symbolic.declare import load_declarations
 
@@ -198,7 +198,7 @@ def state_folder(units: Sequence[Unit]) -> Path:
 
 def finish(state: Path) -> None:
     """Remove what an interrupted run would have gone on from."""
-    for path in [*state.glob("*.json"), *state.glob("*.tmp")]:
+    for path in state.glob("*.json"):
         path.unlink(missing_ok=True)
     if state.is_dir() and not any(state.iterdir()):
         state.rmdir()
@@ -219,10 +219,4 @@ def _recall(state: Path, unit: Unit) -> dict[str, Any] | None:
 
 def _remember(state: Path, unit: Unit, result: dict[str, Any]) -> None:
     path = _place(state, unit)
-    draft = path.with_suffix(f".{os.getpid()}.tmp")
-    try:
-        state.mkdir(parents=True, exist_ok=True)
-        draft.write_text(json.dumps({"unit": asdict(unit), "result": result}), encoding="utf-8")
-        draft.replace(path)  # a file is either whole or not there
-    except OSError as error:
-        raise NotRunError(f"{path}: cannot write: {why(error)}") from None
+    write_text(json.dumps({"unit": asdict(unit), "result": result}), path)

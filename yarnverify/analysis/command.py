@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -15,7 +14,8 @@ from yarnverify.analysis.moduli import compliance, moduli, stiffness
 from yarnverify.analysis.spectra import FAMILIES, Family, at_rest, sign_map
 from yarnverify.analysis.steps import conditions, stabilities
 from yarnverify.analysis.vibrations import Compared, modes, observed_order, pinned_yarn, tight_net
-from yarnverify.errors import NotRunError, why
+from yarnverify.errors import NotRunError
+from yarnverify.files import write_record
 
 COMMAND = "yarnverify analyse --write"
 YARN_SIZES, NET_SIZES, CONDITION_SIZES = (10, 20, 40, 80), (6, 12, 24, 48), (8, 16, 32)
@@ -58,11 +58,7 @@ def analysis(settings: Sequence[str] = (), advance: Advance = lambda label, tota
 def write(record: dict[str, Any], out: Path) -> str:
     """Write the record below a folder of reports; what to say of it."""
     path = out / "records" / "analysis.json"
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise NotRunError(f"{path}: cannot write: {why(error)}") from None
+    write_record(record, path)
     return f"{path}: written; its page and pictures: yarnverify report --pictures"
 
 

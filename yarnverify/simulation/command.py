@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from yarnverify.errors import InputError, NotRunError
+from yarnverify.errors import InputError, NotRunError, why
+from yarnverify.files import write_record
 from yarnverify.simulation.runs import Reached
 from yarnverify.simulation.scene import SOLVERS, Scene, suggestion
 from yarnverify.simulation.setting import Setting
 from yarnverify.simulation.study import Keeping, Study, Tell, study
-from yarnverify.simulation.view.files import write_record
 
 
 def find(name: str) -> Scene:
@@ -207,7 +207,7 @@ class Files:
             for old in [*states.glob(".*.npz.*"), *done]:  # halves of a process that was killed, and a run before
                 old.unlink()
         except OSError as error:
-            raise NotRunError(f"{self.folder} cannot be written: {error.strerror or error}") from None
+            raise NotRunError(f"{self.folder}: cannot write: {why(error)}") from None
 
     def watch(self, problem: Setting, reached: Reached | None) -> None:
         """Write a step of the series for ParaView: at the start, after each stage, and with each frame of a motion."""

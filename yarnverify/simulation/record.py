@@ -8,11 +8,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from yarnverify.files import write_record
 from yarnverify.machine import environment
 from yarnverify.simulation.frugality import frugality
 from yarnverify.simulation.scene import Scene
 from yarnverify.simulation.study import Study, Tell, study
-from yarnverify.simulation.view.files import write_record
 
 COMMAND = "yarnverify simulate --write"
 ROUNDS = 2  # the shorter time of these counts: the first one meets cold memory

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from yarnverify.errors import InputError, NotRunError
+from yarnverify.errors import InputError, NotRunError, why
 
 Array = NDArray[Any]
 FORMAT = 1
@@ -63,7 +63,7 @@ def save(path: str | os.PathLike[str], *, identity: str = "", **arrays: ArrayLik
             os.fsync(file.fileno())
         os.replace(temporary, path)
     except OSError as error:
-        raise NotRunError(f"the state could not be saved to {path}: {error.strerror or error}") from None
+        raise NotRunError(f"the state could not be saved to {path}: {why(error)}") from None
     finally:
         if temporary is not None:
             temporary.unlink(missing_ok=True)

@@ -105,7 +105,7 @@ class Court:
 
     @property
     def without_force(self) -> bool:
-        """Whether some force has a value at no state, as that of an angle between a direction and itself, 0 everywhere."""
+        """Whether some force has a value at no state, as those of an angle that is 0 or pi everywhere."""
 
         def has_value(evaluation: Evaluation, name: Name) -> bool:
             try:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from yarnverify.errors import NotRunError
-from yarnverify.simulation.view.files import whole
+from yarnverify.files import whole
 
 Pixels = NDArray[np.uint8]
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from yarnverify.errors import InputError
+from yarnverify.files import whole
 from yarnverify.simulation.cloth import Fabric
 from yarnverify.simulation.solids import Ball
 from yarnverify.simulation.view.camera import Camera, camera
 from yarnverify.simulation.view.drawing import FAMILIES, Body, Pixels, body, pixels, table_of
-from yarnverify.simulation.view.files import whole
 from yarnverify.simulation.view.measures import Measure, measure, shown
 from yarnverify.simulation.view.movies import write_movie
 from yarnverify.simulation.view.probe import required

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from yarnverify.errors import InputError
+from yarnverify.files import whole
 from yarnverify.simulation.cloth import Fabric
 from yarnverify.simulation.solids import Ball
 from yarnverify.simulation.view.camera import VIEWS, camera
 from yarnverify.simulation.view.drawing import FAMILIES, STONE, UNKNOWN, table_of
-from yarnverify.simulation.view.files import whole
 from yarnverify.simulation.view.measures import MEASURES, Measure, measure
 from yarnverify.simulation.view.pictures import time_note
 from yarnverify.simulation.view.probe import required

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from yarnverify.errors import InputError
+from yarnverify.files import whole
 from yarnverify.simulation.cloth import Fabric
-from yarnverify.simulation.view.files import whole
 from yarnverify.simulation.view.measures import MEASURES, Measure, measure
 from yarnverify.simulation.view.strands import strands
 from yarnverify.simulation.view.tubes import tubes

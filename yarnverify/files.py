@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from yarnverify.errors import NotRunError
+from yarnverify.errors import NotRunError, why
 
 
 @contextmanager
@@ -21,7 +21,7 @@ def whole(path: Path) -> Iterator[Path]:
     NotRunError
         It cannot be written; what was there before is still there.
     """
-    part = path.with_name(f".{path.stem}.part{path.suffix}")
+    part = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")  # of this process alone
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield part
@@ -29,12 +29,18 @@ def whole(path: Path) -> Iterator[Path]:
             os.fsync(written.fileno())
         os.replace(part, path)
     except OSError as error:
-        raise NotRunError(f"{path} cannot be written: {error.strerror or error}") from error
+        raise NotRunError(f"{path}: cannot write: {why(error)}") from error
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # such as a folder that is none
+            part.unlink(missing_ok=True)
+
+
+def write_text(text: str, path: Path) -> None:
+    """Write a text in UTF-8, whole or not at all."""
+    with whole(path) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def write_record(record: Mapping[str, Any], path: Path) -> None:
     """Write JSON data, whole or not at all."""
-    with whole(path) as part:
-        part.write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n", path)
