@@ -309,6 +309,19 @@ def test_a_wrong_definition_explains_its_consequences(source: Source) -> None:
     assert claims(record, "14")[0]["reason"] == "follows from equation (12)"
 
 
+@pytest.mark.parametrize("angle", [r"(-\mathbf{d}_1^T \mathbf{d}_1", r"(\mathbf{d}_1^T \mathbf{d}_1"])
+def test_an_angle_that_is_the_same_everywhere_explains_its_consequences(source: Source, angle: str) -> None:
+    text = changed(source, "12", r"(-\mathbf{d}_1^T \mathbf{d}_2", angle)
+    record = proved(section_of(text, "Bending"))
+    assert {c["verdict"] for c in record["claims"]} == {"proved", "refuted"}
+    assert {c["equation"] for c in record["claims"] if c["verdict"] == "refuted" and not c["because"]} == {
+        "12",
+        "18",
+        "21",
+    }
+    assert all(c["because"] == ["12"] for c in record["claims"] if c["because"])
+
+
 @pytest.mark.parametrize(
     ("title", "equation", "old", "new", "change"),
     [
@@ -535,3 +548,11 @@ def test_a_definition_with_a_point_of_its_own_is_refuted_and_what_it_does_at_res
     (angle,) = claims(record, "12")
     assert (angle["verdict"], angle["reason"]) == ("refuted", "differs from the declared one")
     assert claims(record, "14")[0]["because"] == ["12"]
+
+
+def test_an_angle_that_is_a_product_of_vectors_keeps_their_order(source: Source) -> None:
+    """As a product of numbers its factors could be exchanged, and make a matrix."""
+    angle = changed(source, "31", r"\arccos(\mathbf{d}_1^T \mathbf{d}_3)", r"2 \mathbf{d}_1^T \mathbf{d}_3")
+    record = proved(section_of(angle, "Shear"))
+    assert {c["equation"] for c in record["claims"] if c["verdict"] == "refuted" and not c["because"]} == {"31"}
+    assert {c["verdict"] for c in record["claims"]} == {"proved", "refuted"}

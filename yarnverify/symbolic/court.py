@@ -20,7 +20,7 @@ from yarnverify.symbolic.algebraic import NoValueError, UndefinedError
 from yarnverify.symbolic.blocks import Blocks, flat
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.evidence import BALL_BITS, EXACT_STATES, FEW_BITS, Comparison, Evidence, Witness
-from yarnverify.symbolic.forward import entries
+from yarnverify.symbolic.forward import Evaluation, entries
 from yarnverify.symbolic.latex import name_latex
 from yarnverify.symbolic.normal import Field
 from yarnverify.symbolic.reading import UnsupportedError
@@ -102,6 +102,20 @@ class Court:
             return True
         except UnsupportedError:
             return False
+
+    @property
+    def without_force(self) -> bool:
+        """Whether some force has a value at no state, as those of an angle that is 0 or pi everywhere."""
+
+        def has_value(evaluation: Evaluation, name: Name) -> bool:
+            try:
+                evaluation.value(Expr("force", value=name))
+            except UndefinedError:
+                return False
+            return True
+
+        states = self.evidence.exact
+        return bool(states) and not all(any(has_value(e, name) for e in states) for name in self.section.unknowns)
 
     @cached_property
     def _regions(self) -> dict[int, Blocks]:

@@ -40,19 +40,17 @@ def _rest(section: Section, names: list[Name], aside: Fraction) -> dict[Name, An
 
 def effect(judged: Judged) -> str | None:
     """Printed and true block at rest: eigenvalues of a 3x3 Jacobian, the values of anything else."""
-    section = judged.section
+    claim = judged.claim
+    court = judged.court.reaching([claim.left, claim.right])
+    section = court.section
     if section.declared is None or not section.declared.rest or judged.kind not in ("jacobian", "force"):
         return None
-    claim, witness = judged.claim, judged.finding.witness
-    names = (
-        list(witness.state) if witness is not None else judged.court.names
-    )  # formulas may have points that energies lack
     before = flint.ctx.prec
     flint.ctx.prec = _REST_BITS
     try:
         for aside in (Fraction(0), _ASIDE):
-            state = _rest(section, names, aside)
-            evaluation = Evaluation(section, state, Balls(), judged.court.energy)
+            state = _rest(section, court.names, aside)
+            evaluation = Evaluation(section, state, Balls(), court.energy)
             try:
                 true, printed = evaluation.value(claim.left), evaluation.value(claim.right)
             except UndefinedError:

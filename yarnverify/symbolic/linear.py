@@ -14,8 +14,11 @@ _MOST_TERMS = 64  # what is longer is one atom
 
 
 def linear_form(expr: Expr, meaning: Callable[[Name], Expr | None]) -> Sum:
-    """A scalar tree as ``sum coefficient * monomial``, definitions followed; functions and other denominators are atoms."""
-    op, args = expr.op, [expr.args[0]] if expr.op == "pow" else expr.args
+    """A scalar tree as ``sum coefficient * monomial``, definitions followed.
+
+    Functions, products of vectors and other denominators are atoms.
+    """
+    op, args = expr.op, expr.args[:1] if expr.op == "pow" else expr.args
     if op == "number":
         return _kept({frozenset(): Fraction(int(str(expr.value)))})
     if op == "symbol":
@@ -25,6 +28,11 @@ def linear_form(expr: Expr, meaning: Callable[[Name], Expr | None]) -> Sum:
         return linear_form(plain, meaning)
     if op not in {"add", "neg", "mul", "frac", "pow"}:
         return _atom(expr)
+    if op == "mul":
+        at = next((i for i, arg in enumerate(args) if _is_array(arg)), len(args))
+        if at == 0:
+            return _atom(expr)
+        args = (*args[:at], Expr("mul", args[at:])) if at < len(args) else args
     parts = [linear_form(arg, meaning) for arg in args]
     if op == "add":
         total: Sum = {}
@@ -58,6 +66,11 @@ def tree_of(monomial: Monomial) -> Expr:
         return ONE
     factors.sort(key=repr)
     return factors[0] if len(factors) == 1 else Expr("mul", tuple(factors))
+
+
+def _is_array(factor: Expr) -> bool:
+    """Whether a scalar product begins here: its factors keep their order, so it is one atom."""
+    return factor.op == "transpose" or (factor.op == "symbol" and factor.name.bold)
 
 
 def _atom(expr: Expr) -> Sum:

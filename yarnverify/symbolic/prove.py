@@ -82,7 +82,7 @@ def try_document(
     Definitions and energies are compared with the declared ones where there are any, and are otherwise taken as given.
     Forces and Jacobians are judged against the energy and the definitions that the document itself prints. Where one of
     these has an undefined symbol, the declared one stands in for it, so that the other verdicts are not lost. The same
-    holds for an energy that has no value anywhere.
+    holds for an energy that has no value, or no force, anywhere.
 
     Raises
     ------
@@ -118,7 +118,8 @@ def try_document(
                 finding = _outside_domain(court, section.declared, truth, finding)
             judged.append(_Appeal(court, blamed, declarations).judged(claim, "energy", finding))
             advance(section.energy.relation.equation)
-            if finding.undefined or Court(section, truth).without_value:
+            printed = Court(section, truth)
+            if finding.undefined or printed.without_value or printed.without_force:
                 truth = section.declared.expression
             elif finding.verdict is not Verdict.PROVED and finding.mendable:
                 blamed = [*blamed, judged[-1]]
