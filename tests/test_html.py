@@ -85,6 +85,23 @@ def test_every_verdict_of_the_record_is_shown(text: str) -> None:
         assert verdict == ("refuted" if "refuted" in verdicts else "proved")
 
 
+def test_every_step_of_every_derivation_is_shown(text: str) -> None:
+    own = text.split('<section aria-labelledby="derivations">')[1].split("</section>")[0]
+    parts = dict(zip(*[iter(re.split(r'<h3 id="derivation-(\w+)">', own)[1:])] * 2, strict=True))
+    derived = records()["derivations"]
+    assert list(parts) == list(derived)
+    for name, derivation in derived.items():
+        assert parts[name].count('<div class="formula">') == sum(len(step["formulas"]) for step in derivation["steps"])
+        assert re.findall("<h4>([^<]+)", parts[name]) == [step["title"] for step in derivation["steps"][1:]]
+        assert "ot all proved" not in parts[name]
+
+
+def test_a_derivation_that_failed_says_so() -> None:
+    found = copy.deepcopy(records())
+    found["derivations"]["bending"]["all_proved"] = False
+    assert whole_page(found).count("Not all proved") == 1
+
+
 def test_what_was_not_measured_says_so() -> None:
     found = {name: record for name, record in records().items() if name in ("verdicts", "derivations", "kernels")}
     missing = {"accuracy": None, "benchmark": None, "analysis": None, "simulation": None, "simulation-speed": None}

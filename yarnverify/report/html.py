@@ -28,6 +28,7 @@ _PARTS = (  # anchor and heading, in reading order
     ("verdicts", "Verdicts"),
     ("corrections", "What is wrong in the document"),
     ("equations", "Every equation"),
+    ("derivations", "Derivations"),
     ("accuracy", "Accuracy"),
     ("speed", "Speed"),
     ("scenes", "Scenes"),
