@@ -85,6 +85,30 @@ def test_every_verdict_of_the_record_is_shown(text: str) -> None:
         assert verdict == ("refuted" if "refuted" in verdicts else "proved")
 
 
+def test_every_step_of_every_derivation_is_shown(text: str) -> None:
+    own = text.split('<section aria-labelledby="derivations">')[1].split("</section>")[0]
+    parts = dict(zip(*[iter(re.split(r'<h3 id="derivation-(\w+)">', own)[1:])] * 2, strict=True))
+    derived = records()["derivations"]
+    assert list(parts) == list(derived)
+    for name, derivation in derived.items():
+        assert parts[name].count('<div class="formula">') == sum(len(step["formulas"]) for step in derivation["steps"])
+        assert re.findall("<h4>([^<]+)", parts[name]) == [step["title"] for step in derivation["steps"][1:]]
+        assert "ot all proved" not in parts[name]
+
+
+def test_a_sum_too_long_for_a_line_leaves_its_fraction() -> None:
+    one = r"\left( \mathbf{v}_0 - w_0 \frac{a - b}{c - d} \right)^2"
+    long = r"\frac{\rho \left( " + " + ".join([one] * 4) + r" \right)}{6}"
+    assert formula(long).count("<math") == 5  # what is before the bracket, and a piece for each term
+    assert formula(r"\frac{\rho \left( " + one + r" + b \right)}{6}").count("<math") == 1
+
+
+def test_a_derivation_that_failed_says_so() -> None:
+    found = copy.deepcopy(records())
+    found["derivations"]["bending"]["all_proved"] = False
+    assert whole_page(found).count("Not all proved") == 1
+
+
 def test_what_was_not_measured_says_so() -> None:
     found = {name: record for name, record in records().items() if name in ("verdicts", "derivations", "kernels")}
     missing = {"accuracy": None, "benchmark": None, "analysis": None, "simulation": None, "simulation-speed": None}
@@ -203,7 +227,8 @@ def test_formulas_break_at_their_terms() -> None:
 
 def test_pictures_keep_their_names_apart_and_follow_the_theme() -> None:
     one: Any = """<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" width="10pt" height="5pt"
-        viewBox="0 0 10 5"><metadata>m</metadata><style>*{a:b}</style><defs><path id="m1" d="M 1.23456 2 L 3.00001 4"/></defs>
+        viewBox="0 0 10 5"><metadata>m</metadata><style>*{a:b}</style><defs><path id="m1" d="M 1.23456 2 L 3.00001 4"/>
+        <rect fill="#d9d9d9"/></defs>
         <g id="unused"><use xlink:href="#m1" clip-path="url(#m1)" style="fill: #ffffff; stroke: #0072b2"/></g></svg>"""
     text = inline(one, "bending", 'error "of" <all>')
     root = fromstring(text)
@@ -213,3 +238,15 @@ def test_pictures_keep_their_names_apart_and_follow_the_theme() -> None:
     assert "unused" not in text and "metadata" not in text and "<style" not in text
     assert 'd="M 1.23 2 L 3 4"' in text
     assert "fill: var(--paper); stroke: var(--c0072b2, #0072b2)" in text
+    assert 'fill="var(--shade)"' in text
+
+
+def test_grey_lines_follow_the_page(text: str) -> None:
+    """On a dark page, every dark line has another colour, and a grid of light grey is not brighter than what it carries."""
+    dark = text.split("(prefers-color-scheme: dark)")[1].split("* { box-sizing")[0]
+    used = set(re.findall(r"stroke: var\(--c([0-9a-f]{6}), #", text))
+    for colour in used:
+        if max(bytes.fromhex(colour)) < 0x60:
+            assert f"--c{colour}:" in dark, colour
+        red, green, blue = bytes.fromhex(colour)
+        assert not red == green == blue or red < 0xD0, colour

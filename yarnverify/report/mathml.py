@@ -18,6 +18,7 @@ _RELATIONS = frozenset("=<>≤≥≠≈")
 _SIGNS = frozenset("+\N{MINUS SIGN}")
 _UPRIGHT = frozenset("ΓΔΘΛΞΠΣΥΦΨΩ")
 _WIDE = 9  # leaves; shorter brackets stay in one piece
+_LINE = 60  # leaves; longer sums fill more than a line of paper
 _ROWS = ("math", "mrow", "msqrt")  # their children are a sequence
 
 
@@ -111,7 +112,7 @@ def _mark(left: Element, right: Element) -> None:
 
 def _written(root: Element) -> str:
     pieces: list[list[Element]] = [[]]
-    _cut(list(root), pieces)
+    _cut(_breakable(list(root)), pieces)
     return "<wbr>".join(_piece(nodes) for nodes in pieces if nodes)
 
 
@@ -144,6 +145,29 @@ def _cut(nodes: Sequence[Element], pieces: list[list[Element]]) -> None:
         else:
             pieces[-1].append(deepcopy(node))
         started = text not in _RELATIONS
+
+
+def _breakable(nodes: Sequence[Element]) -> list[Element]:
+    """Fractions with sums too long for a line above the bar: ``a (b + ...) / c`` becomes ``a / c (b + ...)``."""
+    found: list[Element] = []
+    for node in nodes:
+        above = list(node[0]) if node.tag == "mfrac" and node[0].tag == "mrow" and not _fenced(node[0]) else []
+        long = [part for part in above if _fenced(part) and _leaves(part) > _LINE and _has_terms(part)]
+        if long:
+            fraction = Element("mfrac", node.attrib)
+            rest = Element("mrow")
+            rest.extend(part for part in above if part not in long)
+            if not len(rest):
+                rest.append(fromstring("<mn>1</mn>"))
+            fraction.extend([rest, node[1]])
+            found += [fraction, *long]
+        else:
+            found.append(node)
+    return found
+
+
+def _leaves(node: Element) -> int:
+    return sum(1 for part in node.iter() if not len(part))
 
 
 def _has_terms(node: Element) -> bool:

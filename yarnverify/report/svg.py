@@ -10,9 +10,11 @@ _THEME = {  # colours of paper and ink in a picture, and the page's names for th
     "#000000": "var(--ink)",
     "#1a1a1a": "var(--ink)",
     "#e6e6e6": "var(--grid)",
+    "#ebebeb": "var(--grid)",
     "#ededed": "var(--band)",
     "#8c8c8c": "var(--mid)",
     "#b2b2b2": "var(--hatch)",
+    "#d9d9d9": "var(--shade)",
 }
 _COLOUR = re.compile(r"#[0-9a-f]{6}\b")
 _DECIMAL = re.compile(r"-?\d+\.\d+")
@@ -66,7 +68,7 @@ def _adapt(node: Element, name: str, used: set[str]) -> None:
             value = " ".join(_DECIMAL.sub(_shorter, value).split())
         elif key == "transform":
             value = _TRANSLATION.sub(lambda found: _DECIMAL.sub(_shorter, found[0]), value)
-        elif key == "style":
+        elif key in ("style", "fill", "stroke"):  # of a hatched area, colours are attributes
             value = _COLOUR.sub(lambda found: _THEME.get(found[0], f"var(--c{found[0][1:]}, {found[0]})"), value)
         attributes[key] = value
     node.attrib = attributes
