@@ -556,3 +556,25 @@ def test_an_angle_that_is_a_product_of_vectors_keeps_their_order(source: Source)
     record = proved(section_of(angle, "Shear"))
     assert {c["equation"] for c in record["claims"] if c["verdict"] == "refuted" and not c["because"]} == {"31"}
     assert {c["verdict"] for c in record["claims"]} == {"proved", "refuted"}
+
+
+@pytest.mark.parametrize(
+    ("equation", "old", "new", "change"),
+    [
+        ("22", r"\mathbf{F}_{\mathbf{x}_1}", r"\mathbf{F}_{\mathbf{d}_1}", r"\mathbf{d}_1 should be \mathbf{x}_1"),
+        ("24", r"\partial u_1", r"\partial l_1", "l_1 should be u_1"),
+        ("25", r"\mathbf{F}_{\mathbf{x}_1}", r"\mathbf{F}_{\mathbf{k}_b}", None),
+    ],
+)
+def test_a_force_of_what_is_no_unknown_costs_no_other_verdict(
+    source: Source, equation: str, old: str, new: str, change: str | None
+) -> None:
+    """A defined symbol keeps its meaning, and no stray point becomes the one that all others are seen from."""
+    display = next(d for d in source.text.split("$$") if d.endswith(rf"\quad ({equation})"))
+    text = source.text.replace(display, display.replace(old, new, 1))
+    record = proved(section_of(text, "Bending"))
+    assert findings(record) == {"18", "21", equation}
+    assert {c["change"] for c in claims(record, "18")} == {REFUTED["18"][0]}
+    wrong = [c for c in claims(record, equation) if c["verdict"] == "refuted"]
+    assert {c["change"] for c in wrong} == {change}
+    assert not record["tally"]["undecided"] and not record["tally"]["inconsistent"]

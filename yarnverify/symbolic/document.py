@@ -205,6 +205,7 @@ def _unknowns(section: Section, own: Iterable[Relation]) -> None:
     assert section.energy is not None
     section.forget()
     named = {node.name for r in own for m in r.members for node in m.walk() if node.op in {"force", "derivative"}}
+    named = {name for name in named if section.definition(name) is None}  # a misprint; d_1 still means what it says
     section.families |= {(name.base, name.bold) for name in named if INDEX.match(name.sub)}
     base = section.base_symbols(section.energy.expression)
     if section.declared is not None:

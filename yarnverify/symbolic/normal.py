@@ -66,7 +66,8 @@ class Field(Reading):
         here: State | None = None,
     ) -> None:
         super().__init__(section)
-        names = sorted(set(symbols), key=lambda n: (not n.bold, n.base, n.sub))
+        own = section.unknowns  # the place that all others are seen from is one of these, not a misprint's k_b in bold
+        names = sorted(set(symbols), key=lambda n: (not n.bold, n not in own, n.base, n.sub))
         self._points = [n for n in names if n.bold]
         scalars = [n for n in names if not n.bold]
         labels: list[str] = [f"spare{i}" for i in range(_SPARE)]
