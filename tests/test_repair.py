@@ -9,7 +9,7 @@ import pytest
 
 from yarnverify.library import Shelf, shelf_for
 from yarnverify.source import Source
-from yarnverify.symbolic.court import Court, Verdict
+from yarnverify.symbolic.court import Court, Finding, Verdict
 from yarnverify.symbolic.declare import Declarations
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.latex import latex
@@ -194,6 +194,23 @@ def test_a_wrong_name_of_a_block_is_mended(courts: dict[str, Court]) -> None:
 )
 def test_what_no_small_change_mends_is_left(courts: dict[str, Court], right: str) -> None:
     assert mend(courts["Stretch"], BLOCKS["F_x1"], right) is None
+
+
+def test_few_changes_of_an_equation_beyond_repair_are_left_to_the_proof(
+    courts: dict[str, Court], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A change may bring in a point that no other formula has, here x_3 by d_3: doubles sort it out all the same."""
+    judged: list[tuple[Expr, Expr]] = []
+    judge = Court.judge
+
+    def counted(court: Court, left: Expr, right: Expr) -> Finding:
+        judged.append((left, right))
+        return judge(court, left, right)
+
+    monkeypatch.setattr(Court, "judge", counted)
+    right = r"\frac{2 k_b \theta}{l_1 (u_1 - u_3) \sin \theta} \mathbf{P}_1 \mathbf{d}_2"  # its sign and its index
+    assert mend(courts["Bending"], BLOCKS["F_x1"], right) is None
+    assert len(judged) <= 2
 
 
 def test_a_chain_is_mended_as_a_whole(courts: dict[str, Court]) -> None:

@@ -70,6 +70,7 @@ class Court:
         self.names = sorted(names, key=lambda n: (not n.bold, n.base, n.sub))
         declared = section.declared
         self.positive = frozenset(p.name for p in declared.parameters if p.positive) if declared else frozenset()
+        self._larger: dict[frozenset[Name], Court] = {}
 
     @cached_property
     def evidence(self) -> Evidence:
@@ -80,7 +81,12 @@ class Court:
         trees = list(trees)
         names = {name for tree in trees for name in self.section.base_symbols(tree)}
         known = {n for n in names if self.section.is_unknown(n) or n in self.section.parameters}
-        return self if known <= set(self.names) else Court(self.section, self.energy, trees)
+        beyond = frozenset(known) - set(self.names)
+        if not beyond:
+            return self
+        if beyond not in self._larger:
+            self._larger[beyond] = Court(self.section, self.energy, trees)
+        return self._larger[beyond]
 
     # -- first reading
 

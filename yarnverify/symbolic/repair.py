@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 from yarnverify.symbolic.algebraic import UndefinedError
@@ -58,6 +57,7 @@ class Workshop:
     ) -> None:
         self.court, self.members, self.sides, self.fixed = court, members, sides, fixed
         self.section: Section = court.section
+        self._states: dict[Court, list[Evaluation]] = {}
 
     def find(self) -> Repair | None:
         """The cheapest change that is proved, or None."""
@@ -76,10 +76,12 @@ class Workshop:
         court = self.court.reaching([side for pair in pairs for side in pair])
         return all(court.judge(*pair).verdict is Verdict.PROVED for pair in pairs)
 
-    @cached_property
-    def _floats(self) -> list[Evaluation]:
-        states = [dict(evaluation.state) for evaluation in self.court.evidence.exact[:2]]
-        return [Evaluation(self.section, state, Floats(), self.court.energy) for state in states]
+    def _floats(self, court: Court) -> list[Evaluation]:
+        """Two states in double precision, with every symbol that the court knows."""
+        if court not in self._states:
+            states = [dict(evaluation.state) for evaluation in court.evidence.exact[:2]]
+            self._states[court] = [Evaluation(self.section, state, Floats(), court.energy) for state in states]
+        return self._states[court]
 
     def _says_the_same(self, candidate: Candidate) -> bool:
         """Whether the chain still speaks of the blocks that it spoke of, and says something of them."""
@@ -99,10 +101,12 @@ class Workshop:
                     return False
                 if self.section.undefined(left) or self.section.undefined(right):
                     return False
-                if self.court.reaching((left, right)) is not self.court:
-                    continue  # it has symbols that the states do not hold; the proof decides
-                for evaluation in self._floats:
-                    if not self._close(self.court.evidence.sides(evaluation, left, right)):
+                court = self.court.reaching((left, right))
+                floats = self._floats(court)
+                if not floats:
+                    return False  # nothing is proved of what has no states
+                for evaluation in floats:
+                    if not self._close(court.evidence.sides(evaluation, left, right)):
                         return False
         except (ShapeError, UndefinedError):
             return False
