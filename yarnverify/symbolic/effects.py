@@ -40,11 +40,10 @@ def _rest(section: Section, names: list[Name], aside: Fraction) -> dict[Name, An
 
 def effect(judged: Judged) -> str | None:
     """Printed and true block at rest: eigenvalues of a 3x3 Jacobian, the values of anything else."""
-    claim = judged.claim
-    court = judged.court.reaching([claim.left, claim.right])
-    section = court.section
+    claim, section = judged.claim, judged.court.section
     if section.declared is None or not section.declared.rest or judged.kind not in ("jacobian", "force"):
         return None
+    court = judged.court.reaching([claim.left, claim.right])
     before = flint.ctx.prec
     flint.ctx.prec = _REST_BITS
     try:

@@ -108,22 +108,21 @@ def try_document(
     for section in document.sections:
         assert section.energy is not None
         truth, blamed = section.energy.expression, [j for j in wrong if j.section in (section, document.shared)]
+        court = Court(section, truth)
         if section.declared is None:
             given.append((section, section.energy, "energy"))
         else:
             claim = Claim("V", Expr("energy", value=section.energy.symbol), truth, section.energy.relation, 0)
-            court = Court(section, section.declared.expression, [truth])
-            finding = court.judge(claim.left, claim.right)
+            declared = Court(section, section.declared.expression, [truth])
+            finding = declared.judge(claim.left, claim.right)
             if not finding.undefined:
-                finding = _outside_domain(court, section.declared, truth, finding)
-            judged.append(_Appeal(court, blamed, declarations).judged(claim, "energy", finding))
+                finding = _outside_domain(declared, section.declared, truth, finding)
+            judged.append(_Appeal(declared, blamed, declarations).judged(claim, "energy", finding))
             advance(section.energy.relation.equation)
-            printed = Court(section, truth)
-            if finding.undefined or printed.without_value or printed.without_force:
-                truth = section.declared.expression
+            if finding.undefined or court.without_value or court.without_force:
+                court = Court(section, section.declared.expression)
             elif finding.verdict is not Verdict.PROVED and finding.mendable:
                 blamed = [*blamed, judged[-1]]
-        court = Court(section, truth)
         if court.without_value:
             number = section.energy.relation.equation
             document.source.fail(truth.span[0], f"equation ({number}): the energy has no value, it divides by zero")
