@@ -167,6 +167,15 @@ def size(rows: slice) -> int:
     return int(rows.stop - rows.start)
 
 
+def by_component(values: Mapping[str, Array], axis: int) -> dict[str, Array]:
+    """Values by name, those of a vector, whose components lie along an axis, as one each: g.x, g.y, g.z."""
+    found: dict[str, Array] = {}
+    for name, value in values.items():
+        parts = dict(zip("xyz", np.moveaxis(value, axis, 0), strict=True)) if value.ndim == 2 else {}
+        found |= {f"{name}.{letter}": part for letter, part in parts.items()} or {name: value}
+    return found
+
+
 def output_named(
     text: str, convention: Convention, labels: Sequence[tuple[str, slice]], where: str = "--returns"
 ) -> Output | None:

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.check.conventions import ALIASES, Convention
+from yarnverify.check.conventions import ALIASES, Convention, by_component
 from yarnverify.errors import InputError, NotRunError, why
 
 Array = NDArray[Any]
@@ -86,23 +86,11 @@ def write_inputs(
         else:
             text = io.StringIO()
             writer = csv.writer(text, lineterminator="\n")
-            columns = [
-                f"{name}.{axis}" if axis else name
-                for name, v in values.items()
-                for axis in ("xyz" if v.ndim == 2 else ("",))
-            ]
+            columns = by_component(values, axis=1)
             writer.writerow([*convention.labels, *columns])
             writer.writerows(
-                [
-                    [
-                        repr(float(x))
-                        for x in (
-                            *row,
-                            *np.concatenate([np.atleast_1d(value[at]) for value in values.values()] or [row[:0]]),
-                        )
-                    ]
-                    for at, row in enumerate(q)
-                ]
+                [repr(float(x)) for x in (*row, *(column[at] for column in columns.values()))]
+                for at, row in enumerate(q)
             )
             path.write_text(text.getvalue(), encoding="utf-8")
     except OSError as error:

@@ -12,6 +12,7 @@ import numpy as np
 from yarnverify.accuracy.cells import AMPLIFIED, EXACT, significant
 from yarnverify.accuracy.metrics import UNIT
 from yarnverify.check.command import Checked
+from yarnverify.check.conventions import by_component
 from yarnverify.check.judge import Block, allowed
 from yarnverify.check.recognise import Diagnosis
 
@@ -97,12 +98,7 @@ def _state(checked: Checked, at: int) -> dict[str, Any]:
         for axis in (("x", "y", "z") if rows.stop - rows.start == 3 else ("",))
     ]
     values = dict(zip(labels, cases.points.q[:, at].tolist(), strict=True))
-    for name, value in cases.points.parameters.items():
-        values |= (
-            dict(zip((f"{name}.{axis}" for axis in "xyz"), value[:, at], strict=True))
-            if value.ndim == 2
-            else {name: float(value[at])}
-        )
+    values |= {name: value[at] for name, value in by_component(cases.points.parameters, axis=0).items()}
     return {"tag": cases.tags[at], "state": {name: float(value).hex() for name, value in values.items()}}
 
 
