@@ -8,6 +8,7 @@ import numpy as np
 
 from yarnverify.errors import InputError
 from yarnverify.kernels import bending, gravity, kinetic, shear, sphere, stretch
+from yarnverify.simulation import scrim
 from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.dynamics import Scheme
 from yarnverify.simulation.fabric import bends, segments, shears, table, weave
@@ -30,13 +31,13 @@ def draped_cloth(
     radius: float = positive(34e-3, "m", "of the sphere"),
     until: float = positive(0.6, "s"),
     h: float = positive(10e-3, "s", "implicit Euler damps what is faster, as air and friction of fibres do"),
-    k_s: float = positive(10.0, "N", "4 % of 2.5 N/tex: crimp straightens long before fibres stretch"),
-    k_b: float = positive(3e-9, "N m^2", "500 fibres of cotton that slide freely, 6e-12 N m^2 each"),
-    k_x: float = positive(5e-4, "N", "open net: 4 k_x/L = 0.5 N/m, a tenth of a light shirting"),
-    rho: float = positive(1e-4, "kg/m", "cotton yarn of 100 tex"),
+    k_s: float = scrim.k_s,
+    k_b: float = scrim.k_b,
+    k_x: float = scrim.k_x,
+    rho: float = scrim.rho,
     k: float = positive(1e4, "N m^-2", "of the sphere: a depth of 0.1 mm carries 1e-4 N, the weight of 13 crossings"),
-    L: float = positive(4e-3, "m", "scrim, 2.5 yarns a centimetre"),
-    R: float = positive(0.5e-3, "m", "100 tex, hardly twisted: 130 kg/m^3"),
+    L: float = scrim.L,
+    R: float = scrim.R,
     g: float = positive(9.81, "m/s^2", "gravity"),
     scheme: Scheme = choice("implicit_euler", "bdf2", "midpoint"),
 ) -> Moving:

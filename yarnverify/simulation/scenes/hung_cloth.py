@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 
 from yarnverify.errors import InputError
 from yarnverify.kernels import bending, gravity, kinetic, shear, stretch
+from yarnverify.simulation import scrim
 from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.dynamics import Scheme
 from yarnverify.simulation.fabric import bends, segments, shears, weave
@@ -31,12 +32,12 @@ def hung_cloth(
     tilt: float = positive(0.3, "rad", "of the cloth from the vertical, at the start"),
     until: float = positive(2.0, "s"),
     h: float = positive(20e-3, "s", "implicit Euler damps what is faster, as air and friction of fibres do"),
-    k_s: float = positive(10.0, "N", "4 % of 2.5 N/tex: crimp straightens long before fibres stretch"),
-    k_b: float = positive(3e-9, "N m^2", "500 fibres of cotton that slide freely, 6e-12 N m^2 each"),
-    k_x: float = positive(5e-4, "N", "open net: 4 k_x/L = 0.5 N/m, a tenth of a light shirting"),
-    rho: float = positive(1e-4, "kg/m", "cotton yarn of 100 tex"),
-    L: float = positive(4e-3, "m", "scrim, 2.5 yarns a centimetre"),
-    R: float = positive(0.5e-3, "m", "100 tex, hardly twisted: 130 kg/m^3"),
+    k_s: float = scrim.k_s,
+    k_b: float = scrim.k_b,
+    k_x: float = scrim.k_x,
+    rho: float = scrim.rho,
+    L: float = scrim.L,
+    R: float = scrim.R,
     g: float = positive(9.81, "m/s^2", "gravity"),
     scheme: Scheme = choice("implicit_euler", "bdf2", "midpoint"),
 ) -> Moving:
