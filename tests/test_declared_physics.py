@@ -20,7 +20,8 @@ from yarnverify.symbolic.derive import declared_section
 from yarnverify.symbolic.dimensions import DimensionError, check_dimensions, dimension_of_unit, unit_text
 from yarnverify.symbolic.integrals import integral
 from yarnverify.symbolic.invariants import prove_invariants
-from yarnverify.symbolic.modules import kernel_modules, length_power, proved
+from yarnverify.symbolic.modules import kernel_modules, length_power
+from yarnverify.symbolic.programs import proved
 from yarnverify.symbolic.sums import Exact, Stages
 from yarnverify.symbolic.tree import Expr, symbol
 

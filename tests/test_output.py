@@ -17,10 +17,12 @@ from yarnverify.reporting import build_report
 from yarnverify.source import Source
 from yarnverify.symbolic.declare import Declarations, Point, Positive, Sliding, energy, length
 from yarnverify.symbolic.derive import declared_section
-from yarnverify.symbolic.emit import plain_program, statements
+from yarnverify.symbolic.emit import plain_program
 from yarnverify.symbolic.explain import explain, explain_energy, explanation
-from yarnverify.symbolic.modules import VARIANTS, Modules, derived_programs, kernel_modules, printed_program, proved
+from yarnverify.symbolic.modules import VARIANTS, Modules, kernel_modules
 from yarnverify.symbolic.plain import plain
+from yarnverify.symbolic.printing import statements
+from yarnverify.symbolic.programs import derived_programs, printed_program, proved
 from yarnverify.symbolic.prove import read_with
 from yarnverify.symbolic.reader import read_formula
 from yarnverify.symbolic.tree import Expr

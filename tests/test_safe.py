@@ -15,7 +15,7 @@ from yarnverify.accuracy.metrics import measure
 from yarnverify.accuracy.truth import Points, truth
 from yarnverify.kernels import ElementError, geometry
 from yarnverify.kernels.series import TURNING
-from yarnverify.symbolic import angles, safe
+from yarnverify.symbolic import angles, safe, safe_laws
 from yarnverify.symbolic.declare import (
     Declarations,
     Energy,
@@ -29,7 +29,8 @@ from yarnverify.symbolic.declare import (
     length,
 )
 from yarnverify.symbolic.derive import derive_declared
-from yarnverify.symbolic.modules import Proved, derived_programs, module_text, proved
+from yarnverify.symbolic.modules import module_text
+from yarnverify.symbolic.programs import Proved, derived_programs, proved
 from yarnverify.symbolic.tree import Expr
 
 U = 2.0**-53
@@ -159,7 +160,7 @@ def made(declared: Energy, variant: str) -> Any:
     """The module of a declared energy, as ``generate`` would write it; what it rests on is proved in a test of its own."""
     derivation = derive_declared(declared, ())
     assert derivation is not None
-    found = Proved(derivation, tuple(safe.safe_shapes(derivation)))
+    found = Proved(derivation, tuple(safe_laws.safe_shapes(derivation)))
     programs, notes = derived_programs(declared, found, variant)
     assert not notes
     text, _ = module_text(declared, variant, programs, ["own.md"], notes, found)
@@ -172,7 +173,7 @@ def made(declared: Energy, variant: str) -> Any:
 def test_every_block_of_every_shape_is_proved(declared: Energy) -> None:
     derivation = derive_declared(declared, ())
     assert derivation is not None
-    shapes = safe.safe_shapes(derivation)
+    shapes = safe_laws.safe_shapes(derivation)
     assert [shape.shape for shape in shapes] == SHAPES[declared.name]
     for shape in shapes:
         found = shape.check()
@@ -277,7 +278,7 @@ def test_a_wrong_block_is_refuted(damage: str, shape: str, declarations: Any, mo
     bending = next(e for e in declarations.energies if e.name == "bending")
     derivation = derive_declared(bending, declarations.quantities)
     assert derivation is not None
-    found = next(s for s in safe.safe_shapes(derivation) if s.shape == shape).check()
+    found = next(s for s in safe_laws.safe_shapes(derivation) if s.shape == shape).check()
     assert found["dF_x1/dx2"].verdict.value == "refuted"
 
 

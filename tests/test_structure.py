@@ -94,6 +94,9 @@ def test_the_truth_shares_no_code_with_the_derivation() -> None:
         ".court",
         ".prove",
         ".emit",
+        ".steps",
+        ".printing",
+        ".programs",
         ".modules",
     )
     for path in sorted((PACKAGE / "accuracy").glob("*.py")):

@@ -9,23 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import sympy as sp
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from sympy.printing.c import C99CodePrinter
 
 from yarnverify.errors import InputError
 from yarnverify.symbolic.c_functions import Functions, flat, rebuilt
 from yarnverify.symbolic.declare import Energy, load_declarations
-from yarnverify.symbolic.emit import LIBRARY, Program, dof_labels, given_symbols, identifier, statements
-from yarnverify.symbolic.modules import derived_programs, length_power, proved
+from yarnverify.symbolic.emit import dof_labels, given_symbols, identifier
+from yarnverify.symbolic.modules import length_power
+from yarnverify.symbolic.printing import LIBRARY, TEMPLATES, statements
+from yarnverify.symbolic.programs import derived_programs, proved
 from yarnverify.symbolic.reading import UnsupportedError
-
-_TEMPLATES = Environment(
-    loader=FileSystemLoader(Path(__file__).parent / "templates"),
-    undefined=StrictUndefined,
-    trim_blocks=True,
-    lstrip_blocks=True,
-    keep_trailing_newline=True,
-)
+from yarnverify.symbolic.steps import Program
 
 
 class _Printer(C99CodePrinter):  # type: ignore[misc]
@@ -203,6 +197,6 @@ def _texts(energy: Energy, programs: list[Program], notes: list[str]) -> dict[st
         "scaling": "none" if not portable or len(points) < 6 else "points" if angles_alone else "lengths",
     }
     return {
-        f"{energy.name}.c": _TEMPLATES.get_template("energy.c.jinja").render(**values),
-        f"{energy.name}.h": _TEMPLATES.get_template("energy.h.jinja").render(**values),
+        f"{energy.name}.c": TEMPLATES.get_template("energy.c.jinja").render(**values),
+        f"{energy.name}.h": TEMPLATES.get_template("energy.h.jinja").render(**values),
     }

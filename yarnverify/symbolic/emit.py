@@ -7,22 +7,19 @@ output does not need is dropped when the code is recorded (``kernels.tape``), no
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import sympy as sp
-from sympy.printing.numpy import NumPyPrinter
 
 from yarnverify.symbolic.declare import Energy
 from yarnverify.symbolic.document import Section, block_of
 from yarnverify.symbolic.plain import plain
-from yarnverify.symbolic.reading import Reading, UnsupportedError, Value, map_value
+from yarnverify.symbolic.reading import Reading, UnsupportedError, Value
+from yarnverify.symbolic.steps import Check, Program, settled
 from yarnverify.symbolic.tree import FORCE, Expr, Name
 
 AXES = "xyz"
-_OUTPUT = re.compile(r"(g|h|F|dF)_")  # names of block entries; an expression shared with others is not called by them
 Formulas = Mapping[Expr, Expr]  # what each force and Jacobian node stands for
 
 
@@ -152,31 +149,6 @@ def _in_shape(value: Value, expr: Expr) -> Value:
     return value
 
 
-@dataclass(frozen=True)
-class Program:
-    """Straight-line code for one shape of one energy: steps, and outputs over them.
-
-    ``hessian`` holds the upper triangle, row by row. ``checks`` are scalars that must be positive where derivatives
-    (or already the energy) are wanted, each with what it means when one is not. ``choice`` is positive where this shape is
-    the right one; None where it always is. ``prologue`` are lines that come before the steps.
-    """
-
-    steps: Mapping[sp.Symbol, Any]
-    energy: Any
-    gradient: tuple[Any, ...]
-    hessian: tuple[Any, ...]
-    checks: tuple[tuple[Any, str, str], ...] = ()
-    choice: Any = None
-    prologue: tuple[str, ...] = ()
-    name: str = "element"
-
-    @property
-    def outputs(self) -> list[Any]:
-        """Everything that is returned, in order."""
-        choice = [] if self.choice is None else [self.choice]
-        return [self.energy, *self.gradient, *self.hessian, *(check[0] for check in self.checks), *choice]
-
-
 def program(
     energy: Energy, section: Section, tree: Expr, formulas: Formulas, scale: int, angles: Iterable[Name] = ()
 ) -> Program:
@@ -248,9 +220,6 @@ def _entry(value: Value, a: int, b: int, row: bool, column: bool) -> Any:
     return value
 
 
-Check = tuple[Any, str, str]
-
-
 def length_checks(energy: Energy, section: Section, reading: Components, more: str) -> Iterable[Check]:
     """The lengths that the energy is made of."""
     tree = section.expand(energy.expression)
@@ -295,146 +264,3 @@ def _plain(expr: Expr) -> str:
     from yarnverify.symbolic.latex import latex
 
     return latex(expr).replace("_", "").replace("\\", "")
-
-
-def settled(
-    steps: Mapping[sp.Symbol, Any],
-    energy: Any,
-    gradient: list[Any],
-    hessian: list[Any],
-    checks: list[Check],
-    choice: Any,
-    rewrite: Callable[[Any], Any] = lambda value: value,
-) -> Program:
-    """Drop steps that nothing needs, and share common subexpressions. ``rewrite`` is applied to every expression first."""
-    choices = [] if choice is None else [choice]
-    outputs = [energy, *gradient, *hessian, *(check[0] for check in checks), *choices]
-    kept = _needed(steps, outputs)
-    roots = [rewrite(sp.sympify(value)) for value in (*kept.values(), *outputs)]
-    shared, reduced = sp.cse(roots, symbols=(sp.Symbol(f"t{i}", real=True) for i in range(10**6)), order="canonical")
-    everything, rest = _numbered(*_without_aliases(dict(shared), kept, reduced))
-    g, h = 1 + len(gradient), 1 + len(gradient) + len(hessian)
-    new_checks = tuple((v, c[1], c[2]) for v, c in zip(rest[h : h + len(checks)], checks, strict=True))
-    return Program(everything, rest[0], tuple(rest[1:g]), tuple(rest[g:h]), new_checks, rest[-1] if choices else None)
-
-
-def _without_aliases(
-    shared: dict[sp.Symbol, Any], named: Iterable[sp.Symbol], reduced: list[Any]
-) -> tuple[dict[sp.Symbol, Any], list[Any]]:
-    """Steps and outputs in which no step merely renames another: a shared expression takes its given name, if it has one."""
-    names = list(named)
-    rename: dict[sp.Symbol, sp.Symbol] = {}
-    for name, value in zip(names, reduced, strict=False):
-        if value in shared and value not in rename and not _OUTPUT.match(str(name)):
-            rename[value] = name
-        elif value.is_Symbol:
-            rename[name] = rename.get(value, value)
-    steps = {rename.get(symbol, symbol): value.xreplace(rename) for symbol, value in shared.items()}
-    for name, value in zip(names, reduced, strict=False):
-        if not value.is_Symbol:
-            steps[name] = value.xreplace(rename)
-    return steps, [value.xreplace(rename) for value in reduced[len(names) :]]
-
-
-def _numbered(steps: dict[sp.Symbol, Any], outputs: list[Any]) -> tuple[dict[sp.Symbol, Any], list[Any]]:
-    """The same with temporaries numbered as they are met."""
-    ordered = _needed(steps, outputs)
-    temporaries = [symbol for symbol in ordered if re.fullmatch(r"[st]\d+", str(symbol))]
-    rename = {old: sp.Symbol(f"t{i}", real=True) for i, old in enumerate(temporaries)}
-    clash = {symbol: sp.Dummy(str(symbol)) for symbol in rename}  # by way of dummies: old and new names overlap
-    back = {clash[old]: new for old, new in rename.items()}
-
-    def renamed(value: Any) -> Any:
-        return value.xreplace(clash).xreplace(back)
-
-    return {renamed(symbol): renamed(value) for symbol, value in ordered.items()}, [renamed(value) for value in outputs]
-
-
-def _needed(steps: Mapping[sp.Symbol, Any], outputs: Iterable[Any]) -> dict[sp.Symbol, Any]:
-    """The steps that outputs need, each after what it needs itself."""
-    found: dict[sp.Symbol, Any] = {}
-
-    def visit(value: Any) -> None:
-        for symbol in sorted(value.free_symbols, key=str):
-            if symbol in steps and symbol not in found:
-                visit(steps[symbol])
-                found[symbol] = steps[symbol]
-
-    for output in outputs:
-        visit(output)
-    return found
-
-
-# -- text -------------------------------------------------------------------------------------------------------------
-
-
-class _Printer(NumPyPrinter):  # type: ignore[misc]
-    """Scalar code whose every operation is one that ``kernels.tape`` records; integer powers are products."""
-
-    def _print_Pow(self, expr: Any, rational: bool = False, sqrt: str = "sqrt") -> str:
-        base, exponent = expr.args
-        text = self._print(base)
-        if exponent == sp.Rational(1, 2):
-            return f"sqrt({text})"
-        if exponent.is_Rational and exponent.q == 2:
-            whole = abs(int(exponent - sp.sign(exponent) / 2))
-            power = f"sqrt({text})*{self._print(base**whole)}" if whole else f"sqrt({text})"
-            return f"({power})" if exponent > 0 else f"(1/({power}))"
-        if not exponent.is_Integer:
-            raise UnsupportedError(f"the power {expr}")
-        size = abs(int(exponent))
-        inner = text if base.is_Symbol or base.is_Function else f"({text})"
-        product = "*".join([inner] * size) if base.is_Symbol and size <= 4 else f"power({text}, {size})"
-        product = inner if size == 1 else f"({product})" if base.is_Symbol and size <= 4 else product
-        return product if exponent > 0 else f"(1/{product})"
-
-    def _print_Pi(self, expr: Any) -> str:
-        return "PI"
-
-    def _print_sign(self, expr: Any) -> str:
-        return f"select({self._print(expr.args[0])}, 1.0, -1.0)"
-
-    def _print_exp(self, expr: Any) -> str:
-        return f"exp({self._print(expr.args[0])})"
-
-    def _print_log(self, expr: Any) -> str:
-        return f"log({self._print(expr.args[0])})"
-
-    def _print_Function(self, expr: Any) -> str:
-        return f"{expr.func.__name__}({', '.join(self._print(arg) for arg in expr.args)})"
-
-
-_PRINTER = _Printer({"fully_qualified_modules": False})
-LIBRARY = {"arccos", "cos", "exp", "log", "sin", "tan"}  # not correctly rounded, so not the same on every machine
-_FUNCTIONS = {
-    "tape": LIBRARY | {"power", "select", "sqrt"},
- "geometry": {
-        "PI", "angle", "apart", "closing", "corner", "corner_exact", "deviation", "dot", "half_tangent", "in_order",
-        "normal_of", "right_corner", "right_corner_exact", "scaled", "segment", "segment_exact", "segment_twice", "total",
-        "total_twice", "turning", "versine",
-    },
-}  # fmt: skip
-
-
-def text_of(value: Any) -> str:
-    return str(_PRINTER.doprint(value))
-
-
-def statements(program: Program) -> list[str]:
-    """The assignments of a program, each before it is used."""
-    return [
-        *program.prologue,
-        *(f"{symbol} = {text_of(value)}" for symbol, value in _needed(program.steps, program.outputs).items()),
-    ]
-
-
-def used_functions(code: str, module: str) -> list[str]:
-    """The names of ``kernels.tape`` or ``kernels.geometry`` that emitted code uses, in alphabetical order."""
-    return sorted(name for name in _FUNCTIONS[module] if re.search(rf"\b{name}\b", code))
-
-
-__all__ = [
-    "LIBRARY", "Components", "Program", "active", "dof_labels", "domain_checks", "entries_of", "given_symbols", "identifier",
-    "length_checks", "map_value", "plain_program", "program", "row_symbols", "settled", "statements", "text_of",
-    "used_functions", "zero_length",
-]  # fmt: skip

@@ -7,22 +7,21 @@ from typing import Any, Literal, TypeAlias
 
 import sympy as sp
 
+from yarnverify.symbolic.corner import Corner
 from yarnverify.symbolic.declare import Energy, length
 from yarnverify.symbolic.emit import (
-    Check,
     Components,
-    Program,
     active,
     domain_checks,
     entries_of,
     given_symbols,
     identifier,
     row_symbols,
-    settled,
     zero_length,
 )
 from yarnverify.symbolic.measures import Segment
-from yarnverify.symbolic.safe import Corner, Safe
+from yarnverify.symbolic.safe import Safe
+from yarnverify.symbolic.steps import Check, Program, settled
 from yarnverify.symbolic.tree import Name
 
 Digits: TypeAlias = Literal["plain", "exact", "twice"]

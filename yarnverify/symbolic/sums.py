@@ -18,16 +18,15 @@ from yarnverify.symbolic.declare import Energy
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.emit import (
     Components,
-    Program,
     active,
     domain_checks,
     given_symbols,
     length_checks,
     row_symbols,
-    settled,
 )
 from yarnverify.symbolic.measures import differentiate
 from yarnverify.symbolic.reading import Value
+from yarnverify.symbolic.steps import Program, settled
 from yarnverify.symbolic.tree import Expr
 
 _RATIONAL = {"number", "symbol", "add", "neg", "mul", "frac", "pow", "transpose", "dot", "cross"}

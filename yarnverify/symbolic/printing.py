@@ -1,0 +1,87 @@
+"""The text of programs: what is printed is what ``kernels.tape`` can record."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import sympy as sp
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from sympy.printing.numpy import NumPyPrinter
+
+from yarnverify.symbolic.reading import UnsupportedError
+from yarnverify.symbolic.steps import Program, needed
+
+TEMPLATES = Environment(
+    loader=FileSystemLoader(Path(__file__).parent / "templates"),
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    keep_trailing_newline=True,
+)
+
+
+class _Printer(NumPyPrinter):  # type: ignore[misc]
+    """Scalar code whose every operation is one that ``kernels.tape`` records; integer powers are products."""
+
+    def _print_Pow(self, expr: Any, rational: bool = False, sqrt: str = "sqrt") -> str:
+        base, exponent = expr.args
+        text = self._print(base)
+        if exponent == sp.Rational(1, 2):
+            return f"sqrt({text})"
+        if exponent.is_Rational and exponent.q == 2:
+            whole = abs(int(exponent - sp.sign(exponent) / 2))
+            power = f"sqrt({text})*{self._print(base**whole)}" if whole else f"sqrt({text})"
+            return f"({power})" if exponent > 0 else f"(1/({power}))"
+        if not exponent.is_Integer:
+            raise UnsupportedError(f"the power {expr}")
+        size = abs(int(exponent))
+        inner = text if base.is_Symbol or base.is_Function else f"({text})"
+        product = "*".join([inner] * size) if base.is_Symbol and size <= 4 else f"power({text}, {size})"
+        product = inner if size == 1 else f"({product})" if base.is_Symbol and size <= 4 else product
+        return product if exponent > 0 else f"(1/{product})"
+
+    def _print_Pi(self, expr: Any) -> str:
+        return "PI"
+
+    def _print_sign(self, expr: Any) -> str:
+        return f"select({self._print(expr.args[0])}, 1.0, -1.0)"
+
+    def _print_exp(self, expr: Any) -> str:
+        return f"exp({self._print(expr.args[0])})"
+
+    def _print_log(self, expr: Any) -> str:
+        return f"log({self._print(expr.args[0])})"
+
+    def _print_Function(self, expr: Any) -> str:
+        return f"{expr.func.__name__}({', '.join(self._print(arg) for arg in expr.args)})"
+
+
+_PRINTER = _Printer({"fully_qualified_modules": False})
+LIBRARY = {"arccos", "cos", "exp", "log", "sin", "tan"}  # not correctly rounded, so not the same on every machine
+_FUNCTIONS = {
+    "tape": LIBRARY | {"power", "select", "sqrt"},
+ "geometry": {
+        "PI", "angle", "apart", "closing", "corner", "corner_exact", "deviation", "dot", "half_tangent", "in_order",
+        "normal_of", "right_corner", "right_corner_exact", "scaled", "segment", "segment_exact", "segment_twice", "total",
+        "total_twice", "turning", "versine",
+    },
+}  # fmt: skip
+
+
+def text_of(value: Any) -> str:
+    return str(_PRINTER.doprint(value))
+
+
+def statements(program: Program) -> list[str]:
+    """The assignments of a program, each before it is used."""
+    return [
+        *program.prologue,
+        *(f"{symbol} = {text_of(value)}" for symbol, value in needed(program.steps, program.outputs).items()),
+    ]
+
+
+def used_functions(code: str, module: str) -> list[str]:
+    """The names of ``kernels.tape`` or ``kernels.geometry`` that emitted code uses, in alphabetical order."""
+    return sorted(name for name in _FUNCTIONS[module] if re.search(rf"\b{name}\b", code))

@@ -1,0 +1,199 @@
+"""Which programs each variant of an energy consists of, and the proofs that they rest on."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from yarnverify.errors import InputError, NotRunError
+from yarnverify.symbolic.court import Court, Finding, Verdict
+from yarnverify.symbolic.declare import Declarations, Energy
+from yarnverify.symbolic.derive import Derivation, declared_section, derive_declared
+from yarnverify.symbolic.document import Claim, Document, Section, block_of
+from yarnverify.symbolic.emit import plain_program, program
+from yarnverify.symbolic.invariants import prove_invariants
+from yarnverify.symbolic.measures import NoMeasuresError
+from yarnverify.symbolic.places import part_of
+from yarnverify.symbolic.printing import LIBRARY, statements, text_of, used_functions
+from yarnverify.symbolic.reading import UnsupportedError
+from yarnverify.symbolic.repair import Workshop
+from yarnverify.symbolic.safe import Safe
+from yarnverify.symbolic.safe_laws import safe_shapes
+from yarnverify.symbolic.safe_program import safe_program
+from yarnverify.symbolic.steps import Program
+from yarnverify.symbolic.sums import Stages, is_rational
+from yarnverify.symbolic.tree import FORCE, Expr
+
+_PLAIN_SUMS = (
+    "no measures: each sum is formed once, in plain arithmetic, and loses only what the rounding of its terms explains"
+)
+
+
+@dataclass(frozen=True)
+class Proved:
+    """What an energy's kernels are made of, all of it proved.
+
+    Attributes
+    ----------
+    derivation, shapes
+        Of a law of measures: its derivation, and its safe shapes.
+    stages
+        Of an energy that is rational in its coordinates.
+    """
+
+    derivation: Derivation | None = None
+    shapes: tuple[Safe, ...] = ()
+    stages: Stages | None = None
+
+
+def proved(energy: Energy, declarations: Declarations) -> Proved:
+    """Derive an energy and prove all of it.
+
+    Raises
+    ------
+    InputError
+        If an invariance is declared that is not proved.
+    NotRunError
+        If a derived block is not proved.
+    """
+    for what, finding in prove_invariants(energy, declarations.motions).items():
+        if finding.verdict is not Verdict.PROVED:
+            reason = finding.reason or "it changes"
+            raise InputError(
+                f"{energy.name}: {what} is {finding.verdict}: {reason}; it is declared here",
+                part_of(energy.place, "unchanged"),
+            )
+    derivation = derive_declared(energy, declarations.quantities)
+    if derivation is None:
+        section = declared_section(energy)
+        if not is_rational(energy, section):
+            return Proved()
+        stages = Stages(energy, section)
+        if wrong := stages.prove():
+            raise NotRunError(f"{energy.name}: derivatives by {', '.join(wrong)} are not those of the energy")
+        return Proved(stages=stages)
+    _require_proofs(energy.name, derivation.check())
+    shapes: tuple[Safe, ...] = ()
+    with suppress(NoMeasuresError):
+        shapes = tuple(safe_shapes(derivation))
+    for shape in shapes:
+        _require_proofs(f"{energy.name}, {shape.shape} shape", shape.check())
+    return Proved(derivation, shapes)
+
+
+def derived_programs(energy: Energy, found: Proved, variant: str) -> tuple[list[Program], list[str]]:
+    """The programs of a derived variant, and notes on what is not as wished."""
+    if found.stages is not None and variant != "differentiated":
+        return [found.stages.program()], [_PLAIN_SUMS] if variant == "accurate" else []
+    if found.derivation is None:
+        note = "this energy is no law of known measures: plain differentiation, nothing is done for its singular states"
+        section = declared_section(energy)
+        return [plain_program(energy, section) if variant == "differentiated" else Stages(energy, section).program()], [
+            note
+        ]
+    if variant == "differentiated":
+        return [derived_program(energy, found.derivation)], []
+    if not found.shapes:
+        note = "there is no safe form for this law; these are the differentiated formulas"
+        return [derived_program(energy, found.derivation)], [note]
+    shapes = found.shapes
+    if variant == "fast" and shapes[-1].shape == "polar":
+        # within rounding of a fold the plain cross product has no direction any more: there, and only there, the exact one
+        first = safe_program(energy, shapes[0], "plain", shapes, guarded=len(shapes) == 1)
+        return [first, safe_program(energy, shapes[-1], "exact", shapes)], []
+    if variant != "accurate":
+        return [safe_program(energy, shape, "plain", shapes) for shape in shapes], []
+    compares = any(m.b is None for m in shapes[0].derivation.measures)  # a length with what it is at rest
+    if shapes[0].corner is None and compares and energy.elsewhere != "zero":
+        first = safe_program(energy, shapes[0], "exact", shapes, guarded=True)
+        return [first] if first.choice is None else [first, safe_program(energy, shapes[0], "twice", shapes)], []
+    return [safe_program(energy, shape, "twice" if compares else "exact", shapes) for shape in shapes], []
+
+
+def _require_proofs(what: str, found: dict[str, Finding], kind: str = "derived block ") -> None:
+    for block, finding in found.items():
+        if finding.verdict is not Verdict.PROVED:
+            raise NotRunError(f"{what}: {kind}{block} is {finding.verdict}: {finding.reason}")
+
+
+def derived_program(energy: Energy, derivation: Derivation) -> Program:
+    """The program of the derived blocks as they are."""
+    formulas = {block: tree for first, rest in derivation.blocks(1) for block, tree in (first, *rest)}
+    angles = [measure.symbol for measure in derivation.measures if measure.b is not None]
+    return program(energy, derivation.section, derivation.law_tree, formulas, 1, angles)
+
+
+def printed_program(energy: Energy, document: Document) -> tuple[Program, list[str]]:
+    """The program of the document's own formulas, and notes on what had to be read as something else."""
+    section = next((s for s in document.sections if s.declared is not None and s.declared.name == energy.name), None)
+    if section is None or section.energy is None:
+        raise NotRunError(f"{energy.name}: {document.source.name} has no section for it")
+    formulas, notes = _printed_formulas(section)
+    angles = [name for name in section.definitions if _is_arccos(section, name)]
+    try:
+        return program(energy, section, section.energy.expression, formulas, FORCE, angles), notes
+    except UnsupportedError as error:
+        raise NotRunError(f"{energy.name}, variant printed: {error}") from None
+
+
+def _is_arccos(section: Section, name: Any) -> bool:
+    meaning = section.meaning(name)
+    return meaning is not None and meaning.op == "call" and meaning.value == "arccos"
+
+
+def _printed_formulas(section: Section) -> tuple[dict[Expr, Expr], list[str]]:
+    """What the document prints for each block; a chain with an undefined symbol is read as mended."""
+    formulas: dict[Expr, Expr] = {}
+    notes: list[str] = []
+    mended: dict[int, tuple[Expr, ...]] = {}
+    for claim in section.claims:
+        members = claim.relation.members
+        if section.undefined(claim.right):
+            if id(claim.relation) not in mended:
+                mended[id(claim.relation)], note = _mend(section, claim)
+                notes.append(note)
+            members = mended[id(claim.relation)]
+        block, negative = (claim.left.args[0], True) if claim.left.op == "neg" else (claim.left, False)
+        if block_of(block) and block.op in ("force", "derivative"):
+            formulas.setdefault(block, -members[-1] if negative else members[-1])
+    return formulas, notes
+
+
+def _mend(section: Section, claim: Claim) -> tuple[tuple[Expr, ...], str]:
+    from yarnverify.symbolic.repair import describe
+
+    assert section.energy is not None
+    court = Court(section, section.energy.expression)
+    repair = Workshop(court, claim.relation.members, lambda trees: [(t, trees[-1]) for t in trees[:-1]]).find()
+    if repair is None:
+        raise NotRunError(
+            f"equation ({claim.relation.equation}) uses an undefined symbol and cannot be evaluated as printed"
+        )
+    return repair.members, f"equation ({claim.relation.equation}) cannot be evaluated as printed: {describe(repair)}"
+
+
+def library_calls(programs: list[Program]) -> list[str]:
+    """The functions of a mathematical library that programs call."""
+    code = "\n".join(line for made in programs for line in (*statements(made), *map(text_of, made.outputs)))
+    return sorted(LIBRARY & set(used_functions(code, "tape")))
+
+
+def promise(variant: str, found: Proved, calls: bool) -> str:
+    """What errors a kernel promises; see ``runtime.Kernel``."""
+    if variant in ("differentiated", "printed") or calls or not (found.shapes or found.stages):
+        return "none"
+    if variant == "reference":
+        return "units"
+    less = any(_compares_angles(shape) or shape.has_pole for shape in found.shapes)
+    return "units" if variant == "accurate" and found.shapes and not less else "condition"
+
+
+def _compares_angles(shape: Safe) -> bool:
+    """Whether a law adds something to its angle, such as an angle of rest, so that digits of both cancel."""
+    corner = shape.corner
+    if corner is None:
+        return False
+    own = {name for name in shape.given if not name.bold} - {corner.a.l.name, corner.b.l.name}
+    sums = (node for node in shape.law.walk() if node.op == "add")
+    return any(part.op == "symbol" and part.name in own for node in sums for part in node.walk())
