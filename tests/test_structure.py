@@ -83,6 +83,12 @@ def test_sympy_lives_in_symbolic_and_nowhere_else() -> None:
         assert not any(name.split(".")[0] in barred for name in imports(path)), path
 
 
+def test_the_overview_of_symbolic_names_every_module() -> None:
+    overview = (PACKAGE / "symbolic" / "__init__.py").read_text(encoding="utf-8")
+    words = set(re.findall(r"\w+", overview))
+    assert not {path.stem for path in (PACKAGE / "symbolic").glob("*.py")} - words - {"__init__"}
+
+
 def test_the_truth_shares_no_code_with_the_derivation() -> None:
     first = (
         ".normal",

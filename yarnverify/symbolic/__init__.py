@@ -5,13 +5,17 @@ In the order of work::
     tree, functions             the typed expression tree; the functions that formulas may use
     latex, plain                its ways back to LaTeX and to text
     tokens, grammar, reader     LaTeX text -> trees with positions                 (grammar.lark)
-    declare                     energies as a person declares them in derivations/*.py
+    declare, loading, energies, energies as a person declares them in derivations/*.py: their units, the integrals in them,
+      dimensions, integrals,      the motions that leave them as they are, and where in its file a mistake stands
+      invariants, places
     sections, document          trees -> definitions, assumptions, energies and claims per section
     polynomials, square_roots,  reading 1: exact normal forms and derivatives      (FLINT's polynomials)
-      roots, circles, slopes,
-      reading, normal, blocks
+      roots, circles, turns,
+      logarithms, enclosures,
+      slopes, reading, normal,
+      blocks
     algebraic, numbers, linear, reading 2: forward differentiation over exact rationals, balls or doubles
-      jets, forward
+      exponentials, jets, forward
     states, signs, evidence     where reading 2 looks, and what it sees there
     court, prove                a verdict on two sides; the trial of a document
     changes, repair             the smallest true change of a refuted chain
