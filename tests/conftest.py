@@ -16,6 +16,19 @@ settings.register_profile(
 )
 settings.load_profile("ci")
 
+# Coverage is asked of ``symbolic``. To trace a test makes it two or three times as slow, so not all are traced but the files that
+# between them go everywhere there; the others (proofs, mutants, repairs) go the same ways many times.
+TRACED = (
+    "cli", "declare", "derive", "document", "export", "forward", "library", "normal", "output", "own", "reader", "rewritings",
+    "sides",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.path.stem.removeprefix("test_") not in TRACED:
+            item.add_marker("no_cover")
+
 
 @pytest.fixture(scope="session")
 def folder() -> Path:
