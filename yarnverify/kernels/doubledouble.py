@@ -27,12 +27,19 @@ def _pair(value: Fraction) -> tuple[Any, Any]:
 
 
 _PI = _pair(_PI_DIGITS)
+_RATIOS = tuple(_pair(Fraction(2 * (n + 1) ** 2, n * (2 * n + 3))) for n in range(_TERMS, 0, -1))
 
 
 def _sum(a: Any, b: Any) -> tuple[Any, Any]:
     s = a + b
     t = s - a
     return s, (a - (s - t)) + (b - t)
+
+
+def _ordered_sum(a: Any, b: Any) -> tuple[Any, Any]:
+    """The same where a is the larger one or 0."""
+    s = a + b
+    return s, b - (s - a)
 
 
 def _product(a: Any, b: Any) -> tuple[Any, Any]:
@@ -47,13 +54,13 @@ def _product(a: Any, b: Any) -> tuple[Any, Any]:
 
 
 class Pair:
-    """An unevaluated sum of two arrays of doubles."""
+    """An unevaluated sum of two arrays of doubles: ``high`` is the sum rounded, ``low`` what that lacks."""
 
     __slots__ = ("high", "low")
     __array_ufunc__ = None
 
-    def __init__(self, high: Any, low: Any = 0.0) -> None:
-        self.high, self.low = _sum(high, low)
+    def __init__(self, high: Any, low: Any = _REAL(0)) -> None:
+        self.high, self.low = high, low
 
     def _lift(self, other: Any) -> Pair:
         return other if isinstance(other, Pair) else Pair(_REAL(other))
@@ -62,8 +69,8 @@ class Pair:
         other = self._lift(other)
         s, e = _sum(self.high, other.high)
         t, f = _sum(self.low, other.low)
-        s, e = _sum(s, e + t)
-        return Pair(s, e + f)
+        s, e = _ordered_sum(s, e + t)
+        return Pair(*_ordered_sum(s, e + f))
 
     __radd__ = __add__
 
@@ -79,7 +86,7 @@ class Pair:
     def __mul__(self, other: Any) -> Pair:
         other = self._lift(other)
         p, e = _product(self.high, other.high)
-        return Pair(p, e + (self.high * other.low + self.low * other.high))
+        return Pair(*_ordered_sum(p, e + (self.high * other.low + self.low * other.high)))
 
     __rmul__ = __mul__
 
@@ -89,7 +96,7 @@ class Pair:
         rest = self - other * Pair(first)
         second = rest.high / other.high
         rest = rest - other * Pair(second)
-        return Pair(first, second) + rest.high / other.high
+        return Pair(*_sum(first, second)) + rest.high / other.high
 
     def __rtruediv__(self, other: Any) -> Pair:
         return self._lift(other) / self
@@ -102,7 +109,7 @@ class Pair:
         root = np.sqrt(self.high)
         rest = self - Pair(root) * Pair(root)
         safe = np.where(root > 0, root, 1.0)
-        first = Pair(root, rest.high / (2 * safe))
+        first = Pair(*_sum(root, rest.high / (2 * safe)))
         rest = self - first * first
         return first + rest.high / (2 * safe)
 
@@ -118,8 +125,8 @@ class Pair:
     def turning_series(self) -> Pair:
         """(sin t - t cos t)/sin(t)^3 of sin(t/2)^2, by the ratios 2 (n+1)^2 / (n (2n+3)) of its coefficients."""
         total = Pair(np.ones_like(self.high))
-        for n in range(_TERMS, 0, -1):
-            total = 1.0 + total * self * (Pair(_REAL(2.0 * (n + 1) ** 2)) / (n * (2.0 * n + 3)))
+        for ratio in _RATIOS:
+            total = 1.0 + total * self * Pair(*ratio)
         return total / 3.0
 
     @staticmethod
