@@ -27,6 +27,7 @@ def _pair(value: Fraction) -> tuple[Any, Any]:
 
 
 _PI = _pair(_PI_DIGITS)
+_NOTHING = _REAL(0)
 _RATIOS = tuple(_pair(Fraction(2 * (n + 1) ** 2, n * (2 * n + 3))) for n in range(_TERMS, 0, -1))
 
 
@@ -59,7 +60,7 @@ class Pair:
     __slots__ = ("high", "low")
     __array_ufunc__ = None
 
-    def __init__(self, high: Any, low: Any = _REAL(0)) -> None:
+    def __init__(self, high: Any, low: Any = _NOTHING) -> None:
         self.high, self.low = high, low
 
     def _lift(self, other: Any) -> Pair:
