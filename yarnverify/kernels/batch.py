@@ -157,7 +157,7 @@ class Batch:
     def _single(self) -> bool:
         """A batch of one in Python floats, which cost less than arrays of one element; False where it needs more care."""
         kernel = self.kernel
-        plain = kernel.portable and kernel.numbers == "float" and self.dtype == np.float64
+        plain = kernel.portable and kernel.numbers != "double-double" and self.dtype == np.float64
         if not plain or self.watch or self.engine != "numpy":
             return False
         inputs = [float(v) + 0.0 for v in self.rows[:, 0]] + [float(np.reshape(v, -1)[0]) for v in self.values]
@@ -193,7 +193,7 @@ class Batch:
             done.result()
 
     def _worker(self) -> Worker:
-        if self.engine == "compiled" and self.kernel.numbers == "float":
+        if self.engine == "compiled" and self.kernel.numbers != "double-double":
             from yarnverify.kernels.compiled import Loops
 
             return Loops(self)

@@ -15,7 +15,15 @@ from yarnverify.symbolic.declare import Energy, load_declarations
 from yarnverify.symbolic.dimensions import dimension_of_unit
 from yarnverify.symbolic.emit import dof_labels, given_symbols, identifier
 from yarnverify.symbolic.printing import LIBRARY, TEMPLATES, statements, text_of, used_functions
-from yarnverify.symbolic.programs import Proved, derived_programs, library_calls, printed_program, promise, proved
+from yarnverify.symbolic.programs import (
+    Proved,
+    derived_programs,
+    library_calls,
+    numbers,
+    printed_program,
+    promise,
+    proved,
+)
 from yarnverify.symbolic.prove import read_with
 from yarnverify.symbolic.steps import Program
 
@@ -186,7 +194,7 @@ def module_text(
         "scaling": "points" if angles_alone else "lengths",
         "portable": not LIBRARY & set(tape),
         "promise": promise(variant, found, bool(LIBRARY & set(tape))),
-        "numbers": "double-double" if variant == "reference" else "float",
+        "numbers": numbers(variant, found),
         "public": (
             ("energy", "(n,)", "Energy of each element", energy.unit, "Array"),
             ("gradient", vector, "Gradient, the negative of the force", f"{energy.unit}/m", "Array"),

@@ -42,6 +42,14 @@ class _Printer(NumPyPrinter):  # type: ignore[misc]
         product = inner if size == 1 else f"({product})" if base.is_Symbol and size <= 4 else product
         return product if exponent > 0 else f"(1/{product})"
 
+    def _print_Mul(self, expr: Any) -> str:
+        """A third of something is divided by three: 1/3 itself has no number."""
+        factor, rest = expr.as_coeff_Mul()
+        if not factor.is_Rational or factor.q & (factor.q - 1) == 0:
+            return str(super()._print_Mul(expr))
+        text = self._print(sp.Mul(factor.p, rest))
+        return f"({text})/{factor.q}" if (factor.p * rest).is_Add else f"{text}/{factor.q}"
+
     def _print_Pi(self, expr: Any) -> str:
         return "PI"
 
