@@ -14,7 +14,7 @@ from sympy.printing.c import C99CodePrinter
 from yarnverify.errors import InputError
 from yarnverify.symbolic.c_functions import Functions, flat, rebuilt
 from yarnverify.symbolic.declare import Energy, load_declarations
-from yarnverify.symbolic.emit import dof_labels, given_symbols, identifier
+from yarnverify.symbolic.emit import dof_labels, given_symbols
 from yarnverify.symbolic.modules import length_power
 from yarnverify.symbolic.printing import LIBRARY, TEMPLATES, statements
 from yarnverify.symbolic.programs import derived_programs, proved
@@ -188,7 +188,7 @@ def _texts(energy: Energy, programs: list[Program], notes: list[str]) -> dict[st
         "notes": notes,
         "rows": labels,
         "dof": len(labels),
-        "parameters": [(identifier(p.name), p.unit) for p in energy.parameters],
+        "parameters": [(str(symbol), p.unit) for p in energy.parameters for symbol in given_symbols(p.name)],
         "powers": [power for _, power in symbols],
         "functions": functions.used_in(code),
         "shapes": shapes,
