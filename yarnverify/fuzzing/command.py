@@ -85,6 +85,8 @@ def _lines(found: Search) -> list[str]:
     allowed = f"{limit.rounding:g} u" + (f" + {limit.conditioning:g} u x condition" if limit.conditioning else "")
     count = len(found.found)
     outcome = "nothing found" if not count else f"{count} {'kind' if count == 1 else 'kinds'} of flaw found"
+    if found.promise == "none":
+        allowed += ", which it does not promise"
     lines = [
         f"{found.energy}, {found.variant}: {outcome} in {found.cases} elements (seed {found.seed}, limit {allowed})"
     ]

@@ -119,15 +119,17 @@ def judge(module: Any, energy: Energy, element: Element) -> Judgement:
     fits = [_fits(array, element.q.dtype) for array in (true.energy, true.gradient, true.hessian)]
     flaws: list[Flaw] = []
     worst = 0.0
-    calls: list[tuple[Any, str, bool]] = [
-        (module.energy, "E", bool(true.has_energy[0]) and fits[0]),
-        (module.evaluate, "EGH", bool(true.has_derivatives[0]) and all(fits)),
+    calls: list[tuple[Any, str, bool, bool]] = [
+        (module.energy, "E", bool(true.has_energy[0]), fits[0]),
+        (module.evaluate, "EGH", bool(true.has_derivatives[0]), all(fits)),
     ]
-    for function, outputs, has_value in calls:
-        found, flaw = _call(function, element, has_value)
-        if flaw is not None:
+    for function, outputs, has_value, fit in calls:
+        found, flaw = _call(function, element, has_value and fit)
+        if flaw is not None and (
+            flaw.kind != "accepted" or not has_value
+        ):  # an infinity may stand for what does not fit
             flaws.append(flaw)
-        if found is None or not has_value:
+        if found is None or not (has_value and fit):
             continue
         for output, computed in zip(outputs, found, strict=True):
             wrong, size = _compare(limit_of(module), energy, points, true, output, computed)

@@ -50,8 +50,8 @@ class Search:
     ----------
     energy, variant, seed
         What was searched, and the seed that draws the same elements again.
-    limit
-        What errors were held to.
+    limit, promise
+        What errors were held to, and whether the kernel promises that: ``none`` if not.
     cases, regimes
         Number of elements, and of those in each regime; an element may be in several.
     worst, worst_element
@@ -66,6 +66,7 @@ class Search:
     variant: str
     seed: int
     limit: Limit
+    promise: str
     cases: int
     regimes: dict[str, int]
     worst: float
@@ -189,6 +190,7 @@ def search(
         variant,
         seed_,
         limit_of(module),
+        module.KERNEL.promise,
         progress.cases,
         dict(progress.regimes.most_common()),
         progress.worst,
