@@ -158,3 +158,17 @@ def test_without_kernels_it_is_told_how_they_are_made(tmp_path: Path, monkeypatc
         fuzzing.fuzz(None, "accurate", 1.0, 1, lambda label, total: None, project(tmp_path / "bare"))
     with pytest.raises(NotRunError, match=words):
         benchmark(None, (10,), (), of=project(tmp_path / "bare"))
+
+
+def test_a_third_is_divided_by_where_digits_are_twice_as_many() -> None:
+    import sympy as sp
+
+    from yarnverify.symbolic.printing import text_of
+
+    x, y = sp.symbols("x y")
+    assert [text_of(value, divides=True) for value in (x * y / 3, -x / 6 + y, (x / 3) ** 2)] == [
+        "(x*y)/3",
+        "(-x)/6 + y",
+        "(x*x)/9",
+    ]
+    assert text_of(x / 3) == "(1/3)*x" and text_of(x / 4, divides=True) == "(1/4)*x"
