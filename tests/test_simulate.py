@@ -259,6 +259,10 @@ def test_one_clear_error(
 
 
 def test_yarns_too_stiff_for_their_coordinates_are_refused() -> None:
+    with pytest.raises(
+        InputError, match=r"k_s = 1e\+15 N is 2e\+19 times the weight of 0.12 m of it: .* hangs; at most 5.9e\+11 N"
+    ):
+        run("catenary", sizes=(20,), given=("k_s=1e15",))
     with pytest.raises(InputError, match=r"k_s = 1e\+12 N is 3e\+18 times k_b .*; at most 4.*e\+09 N"):
         run("elastica", sizes=(160,), given=("k_s=1e12",))
 
