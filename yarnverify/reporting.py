@@ -16,7 +16,14 @@ from yarnverify.reference import reference
 from yarnverify.show import mistake_lines, tally_lines
 from yarnverify.verdicts import nothing_printed, verdicts
 
-MEASURED = ("accuracy", "benchmark", "analysis", "simulation", "simulation-speed")  # of commands of their own
+MEASURED = (
+    "accuracy",
+    "benchmark",
+    "analysis",
+    "simulation",
+    "simulation-speed",
+    "tutorial",
+)  # of commands of their own
 
 COMMANDS = {
     "accuracy": "yarnverify accuracy --write",
@@ -24,6 +31,7 @@ COMMANDS = {
     "analysis": "yarnverify analyse --write",
     "simulation": "yarnverify simulate --write",
     "simulation-speed": "yarnverify benchmark simulation --json reports/records/simulation-speed.json",
+    "tutorial": "yarnverify tutorial --write",
 }
 
 
