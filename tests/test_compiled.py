@@ -9,7 +9,9 @@ import pytest
 
 from tests.test_kernels import state
 from yarnverify.kernels import VARIANTS, ElementError, bending, stretch
+from yarnverify.kernels.batch import Batch
 from yarnverify.kernels.compiled import source_of
+from yarnverify.kernels.inputs import Engine
 
 CASES = [  # one of each kind, since each takes seconds to compile
     ("bending", "accurate", np.float64),
@@ -45,6 +47,32 @@ def test_any_layout_in_memory_and_any_number_of_elements(function: str) -> None:
         found = getattr(stretch, function)(**given, **parameters, engine="compiled", threads=2)
         found = found if isinstance(found, list | tuple) else (found,)
         assert [a.tobytes() for a in arrays] == [a.tobytes() for a in found]
+
+
+@pytest.mark.parametrize("engine", ["numpy", "compiled"])
+@pytest.mark.parametrize("energy", ["stretch", "sphere"])  # whose second shape is another formula, and zero
+def test_a_call_made_again_has_the_bits_of_a_new_one(energy: str, engine: Engine) -> None:
+    """Whichever of its elements are in the second shape, one or many, and after one that failed."""
+    if engine == "compiled":
+        pytest.importorskip("numba", reason="numba is not installed: the compiled engine was not run")
+    module = importlib.import_module(f"yarnverify.kernels.{energy}")
+    q, parameters = state(energy, n=12)
+    if energy == "sphere":
+        parameters = {"k": 2.0, "c": np.zeros(3), "R": 3.0}
+    away = q.copy()  # stretch: as long as at rest; the sphere: out of reach
+    away[:3] = away[3:6] if energy == "stretch" else 1e3
+    if energy == "stretch":
+        away[0] += away[7] - away[6]
+    rows = q.copy()
+    kept = Batch(module.KERNEL, "EGH", rows, parameters, engine=engine)
+    for second in ([], [3], [3], [5], [3, 7], range(12), range(6), []):
+        rows[:] = q
+        rows[:, list(second)] = away[:, list(second)]
+        found = [array.tobytes() for array in kept.again()]
+        assert found == [array.tobytes() for array in module.packed(rows, **parameters)]
+        rows[0, 4] = np.nan
+        with pytest.raises(ElementError, match=r"element 4: x0\.x is nan"):
+            kept.again()
 
 
 def test_bad_elements_are_named() -> None:

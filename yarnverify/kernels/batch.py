@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache, cached_property
+from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from yarnverify.kernels.arrays import Arrays, Evaluator
 from yarnverify.kernels.inputs import (
     Array,
     Engine,
@@ -41,7 +41,6 @@ CHUNK = 8192  # elements at a time, so that scratch memory stays in the cache
 _MODERATE = {np.dtype(np.float64): 2.0**100, np.dtype(np.float32): 2.0**14}
 
 Where: TypeAlias = slice | Array
-_Evaluator: TypeAlias = Callable[[Array, list[Any], list[Array]], tuple[Array, Array]]
 
 
 class Worker(Protocol):
@@ -52,6 +51,9 @@ class Worker(Protocol):
 
     def second(self, at: Array) -> Array:
         """Evaluate chosen elements by the second shape; its margins."""
+
+    def again(self) -> bool:
+        """Evaluate all at the least cost; False where there are elements that need more care."""
 
 
 class Batch:
@@ -80,7 +82,9 @@ class Batch:
         self.watch = any(not _moderate(value, self.limit) for value in self.values)
         self.threads, self.engine = threads, engine
         dof, n = self.dof, self.n
-        shapes = {"E": (n,), "G": (dof, n), "H": (dof, dof, n) if full else (dof * (dof + 1) // 2, n)}
+        self._scalars = {"E": 1, "G": dof, "H": dof * (dof + 1) // 2}
+        self.count = sum(self._scalars[key] for key in wanted)
+        shapes = {"E": (n,), "G": (dof, n), "H": (dof, dof, n) if full else (self._scalars["H"], n)}
         self.out = outputs_of(kernel, [shapes[key] for key in wanted], self.dtype, out)
         self.reasons: dict[int, str] = {}
         self._kept: Worker | None = None
@@ -88,17 +92,13 @@ class Batch:
     def again(self) -> list[Array]:
         """The outputs for what the rows hold by now, which must be the caller's own array of this kind, not a copy."""
         self.reasons.clear()
-        if self.engine == "compiled" and self._kept is not None and 0 < self.n <= CHUNK and not self.watch:
-            margins, choice = self._kept.first(slice(0, self.n))
-            if self._tame(margins, choice):
-                later = np.flatnonzero(~(choice[0] > 0)) if choice.size else np.empty(0, int)
-                if not later.size or not self._second([later], self._kept):
-                    return self.out
+        if self._kept is not None and self.n <= CHUNK and not self.watch and self._kept.again():
+            return self.out
         return self.results()
 
-    def _tame(self, margins: Array, choice: Array) -> bool:
+    def within(self, margins: Array) -> bool:
         low, high = np.minimum.reduce(margins, None, initial=1.0), np.maximum.reduce(margins, None, initial=1.0)
-        return bool(low > 1 / self.limit and high < self.limit and np.isfinite(choice).all())
+        return bool(low > 1 / self.limit and high < self.limit)
 
     def results(self) -> list[Array]:
         """The outputs, filled.
@@ -134,10 +134,19 @@ class Batch:
                 targets += list(array[:, where])
         return targets
 
-    def scatter(self, at: Array, part: Iterable[Any]) -> None:
-        """Write results of chosen elements, a row of ``part`` for each output scalar."""
-        for target, row in zip(self.targets(slice(None)), part, strict=True):
-            target[at] = row
+    def scatter(self, at: Array, part: Array) -> None:
+        """Write results of chosen elements, a row of ``part`` for each output scalar, (k, m) or (k, 1)."""
+        done = 0
+        for key, array in zip(self.wanted, self.out, strict=True):
+            rows = part[done : done + self._scalars[key]]
+            done += len(rows)
+            if key == "E":
+                array[at] = rows[0]
+            elif array.ndim == 3:
+                for (i, j), row in zip(upper(self.dof), rows, strict=True):
+                    array[i, j, at] = row
+            else:
+                array[:, at] = rows
         self.mirror(at)
 
     def mirror(self, where: Where) -> None:
@@ -152,31 +161,38 @@ class Batch:
         """The parameters of chosen elements, each 0-d or (m,)."""
         return [value if np.ndim(value) == 0 else value[where] for value in self.values]
 
-    # -- a batch of one
+    # -- elements one by one
+
+    def one(self, shape: int, element: int) -> list[float] | None:
+        """Outputs, margins and choice of one element in Python floats, which cost less than arrays of few elements.
+
+        None where that does not serve: of other numbers, and where arrays would hold infinity or NaN.
+        """
+        kernel = self.kernel
+        if not kernel.portable or kernel.numbers == "double-double" or self.dtype != np.float64:
+            return None
+        values = [float(value if np.ndim(value) == 0 else value[element]) for value in self.values]
+        try:
+            return kernel.tape(shape, self.wanted, self.dtype).run_one(
+                [v + 0.0 for v in self.rows[:, element].tolist()] + values
+            )
+        except (ArithmeticError, ValueError):
+            return None
 
     def _single(self) -> bool:
-        """A batch of one in Python floats, which cost less than arrays of one element; False where it needs more care."""
-        kernel = self.kernel
-        plain = kernel.portable and kernel.numbers != "double-double" and self.dtype == np.float64
-        if not plain or self.watch or self.engine != "numpy":
+        """A batch of one; False where it needs more care."""
+        if self.watch or self.engine != "numpy":
             return False
-        inputs = [float(v) + 0.0 for v in self.rows[:, 0]] + [float(np.reshape(v, -1)[0]) for v in self.values]
-        try:
-            found = kernel.tape(0, self.wanted, self.dtype).run_one(inputs)
-        except (ArithmeticError, ValueError):
+        found = self.one(0, 0)
+        if found is None:
             return False
-        sizes = {"E": 1, "G": self.dof, "H": self.dof * (self.dof + 1) // 2}
-        rest = found[sum(sizes[key] for key in self.wanted) :]
-        margins = rest[: len(kernel.shapes[0].checks)]
+        rest = found[self.count :]
+        margins = rest[: len(self.kernel.shapes[0].checks)]
         if not all(1 / self.limit < m < self.limit for m in margins):
             return False
         if not all(0 < c < math.inf for c in rest[len(margins) :]):
             return False
-        at = 0
-        for key, array in zip(self.wanted, self.out, strict=True):
-            part = found[at : at + sizes[key]]
-            at += sizes[key]
-            array[..., 0] = part[0] if key == "E" else np.array(part)[_square(self.dof)] if array.ndim == 3 else part
+        self.scatter(np.zeros(1, int), np.array(found)[:, None])
         return True
 
     # -- many
@@ -197,7 +213,7 @@ class Batch:
             from yarnverify.kernels.compiled import Loops
 
             return Loops(self)
-        return _Arrays(self)
+        return Arrays(self)
 
     def _some(self, ranges: list[slice], worker: Worker | None = None) -> None:
         """The chunks of one thread: all in the first shape, then those of the second, then those that need care."""
@@ -216,18 +232,18 @@ class Batch:
                     other = ~(choice[0] > 0)
                     later.append(where.start + np.flatnonzero(other if odd is None else other & ~odd))
                     if sum(at.size for at in later) > CHUNK // 2:  # enough for one call, and still in the cache
-                        strange += self._second(later, worker)
+                        strange += self.second(later, worker)
                         later.clear()
-            strange += self._second(later, worker)
+            strange += self.second(later, worker)
             for at in _groups(strange):
                 self._special(at)
 
-    def _second(self, later: list[Array], worker: Worker) -> list[Array]:
+    def second(self, later: list[Array], worker: Worker) -> list[Array]:
         """Evaluate elements in the second shape, or set them to zero; those of them that need more care."""
         found = []
         for at in _groups(later):
             if len(self.kernel.shapes) == 1:
-                self.scatter(at, [0.0] * len(self.targets(slice(0, 0))))
+                self.scatter(at, np.zeros((self.count, 1)))
                 continue
             odd = self._strange(worker.second(at), at)
             if odd is not None:
@@ -244,11 +260,11 @@ class Batch:
                 strange |= ~np.isfinite(target)
             strange |= ~((margins > low) & (margins < self.limit)).all(axis=0)
             return np.asarray(strange) if strange.any() else None
-        if margins.min() > low and margins.max() < self.limit:
+        if self.within(margins):
             return None
         return np.asarray(~((margins > low) & (margins < self.limit)).all(axis=0))
 
-    def evaluator(self, shape: int) -> _Evaluator:
+    def evaluator(self, shape: int) -> Evaluator:
         """A function that fills targets with the outputs of a shape by NumPy, and gives margins and choice as rows."""
         kernel, checks = self.kernel, len(self.kernel.shapes[shape].checks)
         if kernel.numbers == "double-double":
@@ -287,7 +303,7 @@ class Batch:
         rows = np.where(np.isfinite(rows), rows, 0)
         exponent = exponents(kernel, rows, self.limit)
         rows, values = scaled(kernel, rows, self.values_at(elements), exponent)
-        found = np.empty((len(self.targets(slice(0, 0))), elements.size), self.dtype)
+        found = np.empty((self.count, elements.size), self.dtype)
         margins, choice = self._again(0, np.arange(elements.size), rows, values, found)
         other = ~(choice[0] > 0) if choice.size else np.zeros(elements.size, bool)
         self._refuse(0, margins, other, reasons, only="energy")  # derivatives are the other shape's affair
@@ -322,31 +338,6 @@ class Batch:
                 reasons[mine & ~(margin > 0) & (reasons == "")] = reason
 
 
-class _Arrays:
-    """NumPy calls a chunk at a time."""
-
-    def __init__(self, batch: Batch) -> None:
-        self._batch = batch
-        self._by_first = batch.evaluator(0)
-
-    @cached_property
-    def _by_second(self) -> _Evaluator:
-        return self._batch.evaluator(1)
-
-    def first(self, where: slice) -> tuple[Array, Array]:
-        batch = self._batch
-        found = self._by_first(batch.rows[:, where], batch.values_at(where), batch.targets(where))
-        batch.mirror(where)
-        return found
-
-    def second(self, at: Array) -> Array:
-        batch = self._batch
-        part = scratch("results", len(batch.targets(slice(0, 0))), at.size, batch.dtype)
-        margins, _ = self._by_second(batch.rows.take(at, axis=1), batch.values_at(at), list(part))
-        batch.scatter(at, part)
-        return margins
-
-
 @cache
 def _pool(threads: int) -> ThreadPoolExecutor:
     """Threads that stay, and with them their scratch memory."""
@@ -361,15 +352,6 @@ if hasattr(os, "register_at_fork"):  # a forked process has the pools, but none 
 def upper(dof: int) -> list[tuple[int, int]]:
     """Row and column of each entry of a packed upper triangle."""
     return [(i, j) for i in range(dof) for j in range(i, dof)]
-
-
-@cache
-def _square(dof: int) -> Array:
-    """Where each entry of a symmetric matrix stands in its packed upper triangle, (dof, dof)."""
-    places = np.zeros((dof, dof), int)
-    for at, (i, j) in enumerate(upper(dof)):
-        places[i, j] = places[j, i] = at
-    return places
 
 
 def _groups(found: list[Array]) -> list[Array]:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 Array = NDArray[Any]
 BLOCK = 256  # elements whose inputs and results stay in the cache together
 STRIDE = BLOCK + 8  # from row to row: with a power of two all rows would fall into the same few lines of the cache
+USUAL, MIXED, STRANGE = 0, 1, 2  # what a loop says of its elements
 _MAKING = threading.Lock()  # threads that share a batch make its loop once
 _INFIX = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
 _PREFIX = {"negative": "-", "positive": "+"}
@@ -40,6 +41,9 @@ _CALLS = {"absolute": "abs", "sqrt": "sqrt", "arccos": "acos"} | {
 
 def source_of(tape: Tape, layout: str) -> str:
     """The loop over elements as text, scalar statements in the order of the tape.
+
+    It returns STRANGE if a margin, in the first ``checks`` rows of ``rest``, is not between 1/limit and limit, or a choice, in
+    the others, is not finite; else MIXED if a choice is not positive; else USUAL.
 
     Parameters
     ----------
@@ -77,11 +81,12 @@ def write(found, places, out, first, at, count):
 
 
 @njit(
-    [(inputs, real[:, ::1], whole, whole, index[::1], whole[:, ::1], outputs, whole[:, ::1], outputs, whole[:, ::1], outputs,
-      real[:, ::1])],
+    [whole(inputs, real[:, ::1], whole, whole, index[::1], whole[:, ::1], outputs, whole[:, ::1], outputs,
+      whole[:, ::1], outputs, real[:, ::1], whole, real)],
     nogil=True, error_model="numpy", fastmath=False, cache=True,
 )
-def loop(q, values, first, number, at, places_e, energy, places_g, gradient, places_h, hessian, rest):
+def loop(q, values, first, number, at, places_e, energy, places_g, gradient, places_h, hessian, rest, checks, limit):
+    tame = same = True
     given = np.zeros({given}, real)
     found = np.empty({found}, real)
     rows, more = q.shape[0], values.shape[0]
@@ -106,7 +111,14 @@ def loop(q, values, first, number, at, places_e, energy, places_g, gradient, pla
         write(found, places_h, hessian, first + start, now, count)
         for k in range(rest.shape[0]):
             for j in range(count):
-                rest[k, start + j] = found[({tape.outputs} - rest.shape[0] + k) * {STRIDE} + j]
+                value = found[({tape.outputs} - rest.shape[0] + k) * {STRIDE} + j]
+                rest[k, start + j] = value
+                if k < checks:
+                    tame &= (value > 1 / limit) & (value < limit)
+                else:
+                    tame &= np.isfinite(value)
+                    same &= value > 0
+    return {USUAL} if tame and same else {MIXED} if tame else {STRANGE}
 """
 
 
@@ -136,7 +148,7 @@ def _statements(tape: Tape) -> list[str]:
     return lines + [f"found[{i * STRIDE} + j] = {fresh[outputs + i]}" for i in range(tape.outputs)]
 
 
-def _load(text: str) -> Callable[..., None]:
+def _load(text: str) -> Callable[..., int]:
     """The compiled loop; its source lies in the cache folder, where numba keeps the machine code beside it."""
     if importlib.util.find_spec("numba") is None:
         raise RuntimeError("the engine 'compiled' needs numba: pip install 'yarnverify[compiled]'")
@@ -153,7 +165,7 @@ def _load(text: str) -> Callable[..., None]:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)
-    loop: Callable[..., None] = module.loop
+    loop: Callable[..., int] = module.loop
     return loop
 
 
@@ -165,13 +177,13 @@ class Loops:
         self._outputs = _outputs(batch)
         self._layout = "C" if all(array.flags.c_contiguous for array in (batch.rows, *self._outputs)) else "A"
         self._by_first = self._loop(0)
-        self._memory: dict[tuple[int, int], tuple[Array, Array]] = {}
+        self._chosen: tuple[bytes, tuple[Any, ...]] = b"", ()  # the last ones of the second shape
 
     @cached_property
-    def _by_second(self) -> Callable[..., None]:
+    def _by_second(self) -> Callable[..., int]:
         return self._loop(1)
 
-    def _loop(self, shape: int) -> Callable[..., None]:
+    def _loop(self, shape: int) -> Callable[..., int]:
         kernel, wanted, dtype = self._batch.kernel, self._batch.wanted, self._batch.dtype
         key = (shape, wanted, dtype, self._layout)
         with _MAKING:
@@ -180,32 +192,43 @@ class Loops:
             return kernel.loops[key]
 
     def first(self, where: slice) -> tuple[Array, Array]:
-        shape = self._batch.kernel.shapes[0]
-        tape = self._batch.kernel.tape(0, self._batch.wanted, self._batch.dtype)
-        rest = self._run(self._by_first, tape, where, where.start, where.stop - where.start, np.empty(0, np.uint64))
-        return rest[: len(shape.checks)], rest[len(shape.checks) :]
+        given = self._arguments(0, where, where.start, where.stop - where.start, np.empty(0, np.uint64))
+        self._by_first(*given)
+        return self._margins(given)
 
     def second(self, at: Array) -> Array:
-        tape = self._batch.kernel.tape(1, self._batch.wanted, self._batch.dtype)
-        return self._run(self._by_second, tape, at, 0, at.size, at.astype(np.uint64))
+        given = self._arguments(1, at, 0, at.size, at.astype(np.uint64))
+        self._by_second(*given)
+        return self._margins(given)[0]
 
-    def _run(
-        self, loop: Callable[..., None], tape: Tape, where: slice | Array, first: int, number: int, at: Array
-    ) -> Array:
-        batch = self._batch
-        key = (id(tape), number)
-        if at.size or number < batch.n or key not in self._memory:
-            values = np.empty((len(batch.values), number), batch.dtype)
-            for row, value in zip(values, batch.values_at(where), strict=True):
-                row[:] = value
-            written = sum({"E": 1, "G": batch.dof, "H": batch.dof * (batch.dof + 1) // 2}[key] for key in batch.wanted)
-            rest = np.empty((tape.outputs - written, number), batch.dtype)
-            if number == batch.n and not at.size:
-                self._memory[key] = values, rest
-        else:
-            values, rest = self._memory[key]
-        loop(batch.rows, values, first, number, at, *self._outputs, rest)
-        return rest
+    def again(self) -> bool:
+        found = self._by_first(*self._whole)
+        if found != MIXED:
+            return found == USUAL
+        at = (~(self._margins(self._whole)[1][0] > 0)).nonzero()[0]
+        if len(self._batch.kernel.shapes) == 1:
+            return not self._batch.second([at], self)
+        if at.tobytes() != self._chosen[0]:
+            self._chosen = at.tobytes(), self._arguments(1, at, 0, at.size, at.astype(np.uint64))
+        return self._by_second(*self._chosen[1]) == USUAL
+
+    @cached_property
+    def _whole(self) -> tuple[Any, ...]:
+        return self._arguments(0, slice(0, self._batch.n), 0, self._batch.n, np.empty(0, np.uint64))
+
+    def _arguments(self, shape: int, where: slice | Array, first: int, number: int, at: Array) -> tuple[Any, ...]:
+        batch, kernel = self._batch, self._batch.kernel
+        values = np.empty((len(batch.values), number), batch.dtype)
+        for row, value in zip(values, batch.values_at(where), strict=True):
+            row[:] = value
+        outputs = kernel.tape(shape, batch.wanted, batch.dtype).outputs
+        rest = np.empty((outputs - batch.count, number), batch.dtype)
+        checks, limit = len(kernel.shapes[shape].checks), batch.dtype.type(batch.limit)
+        return batch.rows, values, first, number, at, *self._outputs, rest, checks, limit
+
+    def _margins(self, given: tuple[Any, ...]) -> tuple[Array, Array]:
+        rest, checks, _ = given[-3:]
+        return rest[:checks], rest[checks:]
 
 
 def _outputs(batch: Batch) -> list[Array]:

@@ -221,6 +221,16 @@ class Tape:
             else:
                 ufunc(slots[first], slots[result])
 
+    def calls_on(
+        self, inputs: Sequence[Any], outputs: Sequence[Array], scratch: Array
+    ) -> list[tuple[Any, tuple[Any, ...]]]:
+        """The functions that ``run`` calls and their arguments, to be called again on the same arrays."""
+        slots: list[Any] = [*inputs, *outputs, *scratch, *self._constants]
+        return [
+            (function, tuple(slots[i] for i in (*operands, result) if i >= 0))
+            for function, *operands, result in self._array_calls
+        ]
+
     def run_one(self, inputs: Sequence[float]) -> list[float]:
         """Outputs of a single element, in Python floats: the same bits at a tenth of the cost.
 
@@ -239,7 +249,7 @@ class Tape:
 
 
 def _select(condition: Array, yes: Array, no: Array, out: Array) -> None:
-    np.copyto(out, np.where(condition > 0, yes, no))
+    out[...] = np.where(condition > 0, yes, no)  # out may be one of the others
 
 
 def _maximum(a: Array, b: Array, out: Array) -> None:

@@ -165,9 +165,7 @@ class System:
                     self.calls.form(self._forms[number], term, q, part, packed, places)
             start = self.clock()
             total += float(np.add.reduce(e))
-            most, least = np.maximum.reduce(g, None, initial=0.0), np.minimum.reduce(g, None, initial=0.0)
-            force = max(force, float(most), -float(least))
-            self.scatter.entries(slope, term.table.rows[:, part], g)
+            force = max(force, self.scatter.entries(slope, term.table.rows[:, part], g))
             if packed is not None:
                 self.scatter.blocks(sums, places, part, packed, places.rows)
             self.seconds["assembly"] += self.clock() - start

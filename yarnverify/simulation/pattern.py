@@ -55,6 +55,16 @@ class Places:
         """Row of the packed Hessian of each entry, in the order in which they are summed, (k,)."""
         return self.pairs[self.which]
 
+    @cached_property
+    def every(self) -> Array:
+        """Where in the sums each entry of each element goes, in the order in which they are summed, (k n,)."""
+        found = self.base[self.block].astype(np.intp)
+        if self.turned.size:
+            found += np.where(self.turned[self.block], self.transposed[:, None], self.straight[:, None])
+        else:
+            found += self.straight[:, None]
+        return found.ravel()
+
     def turn(self, values: Array, part: slice) -> None:
         """Change the sign of entries (k, m) of a skew matrix where their block is summed transposed."""
         if self.turned.size:

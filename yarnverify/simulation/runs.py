@@ -197,16 +197,25 @@ class Run:
 
 
 def _told(problem: Setting) -> None:
-    """Refuse yarns so stiff that rounding of their coordinates makes more force than bending them does."""
+    """Refuse yarns so stiff that rounding of their coordinates makes more force than bending them does, or their weight."""
     given = {term.kernel.KERNEL.name: term.parameters for term in problem.terms if term.table.count}
-    if not {"stretch", "bending"} <= given.keys():
+    if "stretch" not in given:
         return
-    k_s, k_b = float(np.max(given["stretch"]["k_s"])), float(np.min(given["bending"]["k_b"]))
-    extent = float(np.ptp(problem.fabric.points(problem.fabric.Q), axis=0).max())
-    if k_s * extent**2 > STIFFEST * k_b:
-        most = STIFFEST * k_b / extent**2
-        raise InputError(f"k_s = {k_s:g} N is {k_s * extent**2 / k_b:.0e} times k_b over the square of {extent:g} m: "
-                         f"coordinates cannot tell how such a yarn bends; at most {most:.2g} N")  # fmt: skip
+    k_s, extent = (
+        float(np.max(given["stretch"]["k_s"])),
+        float(np.ptp(problem.fabric.points(problem.fabric.Q), axis=0).max()),
+    )
+    if "bending" in given:
+        most = STIFFEST * float(np.min(given["bending"]["k_b"])) / extent**2
+        other, does = f"k_b over the square of {extent:g} m", "bends"
+    elif "gravity" in given:
+        weight = given["gravity"]["rho"] * np.linalg.norm(given["gravity"]["g"], axis=0)
+        most, other, does = STIFFEST * float(np.min(weight)) * extent, f"the weight of {extent:g} m of it", "hangs"
+    else:
+        return
+    if k_s > most:
+        raise InputError(f"k_s = {k_s:g} N is {STIFFEST * k_s / most:.0e} times {other}: "
+                         f"coordinates cannot tell how such a yarn {does}; at most {most:.2g} N")  # fmt: skip
 
 
 def _of_motion(motion: Motion, frames: list[Array], times: list[float]) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from yarnverify.kernels.inputs import Engine
 from yarnverify.simulation.pattern import Places
 
 Array = NDArray[Any]
+FEW = 512  # elements up to which NumPy is called once for all entries
 MANY = 20_000  # elements from which compiled loops are worth the seconds that making them can take
 
 
@@ -30,8 +31,8 @@ def engine_for(wanted: str, elements: int) -> Engine:
 class Scatter(Protocol):
     """Adds the values of some elements to sums."""
 
-    def entries(self, sums: Array, at: Array, values: Array) -> None:
-        """``sums[at[k, e]] += values[k, e]``, k outermost."""
+    def entries(self, sums: Array, at: Array, values: Array) -> float:
+        """``sums[at[k, e]] += values[k, e]``, k outermost; the greatest of the values in absolute value, 0 of none."""
 
     def blocks(self, sums: Array, places: Places, part: slice, values: Array, rows: Array) -> None:
         """Rows ``rows`` of values, one for each entry in the order of ``places``, to where they go."""
@@ -40,13 +41,23 @@ class Scatter(Protocol):
 class Arrays:
     """By NumPy."""
 
-    def entries(self, sums: Array, at: Array, values: Array) -> None:
+    def entries(self, sums: Array, at: Array, values: Array) -> float:
         """Add entries."""
-        for places, row in zip(at, values, strict=True):
-            np.add.at(sums, places.astype(np.intp), row)  # only this kind of index takes NumPy's fast way
+        if values.shape[1] <= FEW:
+            np.add.at(
+                sums, at.ravel().astype(np.intp), values.ravel()
+            )  # only this kind of index takes NumPy's fast way
+        else:
+            for places, row in zip(at, values, strict=True):
+                np.add.at(sums, places.astype(np.intp), row)
+        most, least = np.maximum.reduce(values, None, initial=0.0), np.minimum.reduce(values, None, initial=0.0)
+        return max(float(most), -float(least))
 
     def blocks(self, sums: Array, places: Places, part: slice, values: Array, rows: Array) -> None:
         """Add entries of blocks."""
+        if places.base.shape[1] <= FEW and values.shape[1] == places.base.shape[1]:
+            np.add.at(sums, places.every, values[rows].ravel())
+            return
         turned, block = None, -1
         entries = (rows, places.block, places.straight, places.transposed)
         for row, number, straight, transposed in zip(*(a.tolist() for a in entries), strict=True):
@@ -71,9 +82,9 @@ class Loops:
     def __init__(self) -> None:
         self._entries, self._blocks = _loops()
 
-    def entries(self, sums: Array, at: Array, values: Array) -> None:
+    def entries(self, sums: Array, at: Array, values: Array) -> float:
         """Add entries."""
-        self._entries(sums, at, values)
+        return float(self._entries(sums, at, values))
 
     def blocks(self, sums: Array, places: Places, part: slice, values: Array, rows: Array) -> None:
         """Add entries of blocks."""
@@ -92,10 +103,13 @@ def _loops() -> tuple[Any, Any]:
 
     @njit(cache=True, nogil=True)
     def entries(sums, at, values):  # type: ignore[no-untyped-def]
+        most = 0.0
         for k in range(at.shape[0]):
             places, row = at[k], values[k]
             for e in range(places.size):
                 sums[np.uint64(places[e])] += row[e]
+                most = max(most, abs(row[e]))
+        return most
 
     @njit(cache=True, nogil=True)
     def blocks(sums, base, turned, values, rows, block, straight, transposed):  # type: ignore[no-untyped-def]

@@ -29,6 +29,7 @@ __all__ = ["EPSILON", "Equilibrium", "Iteration", "NotConverged", "Options", "Se
 
 Array = NDArray[Any]
 EPSILON = float(np.finfo(float).eps)
+SEEN = 1e-13  # of the extent: steps that count, of a state whose forces are all explained by rounding
 _NOTHING = sparse.csc_array((0, 0))
 
 
@@ -54,6 +55,7 @@ class Search:
     _lowest_energy: float = np.inf
     _energy: float = np.inf
     _residual: float = np.inf
+    _shown: float = np.inf
     _extent: float = 0.0
     _step: float = np.inf
     _stale: int = 0
@@ -116,7 +118,7 @@ class Search:
     def _start_again(self, Q: Array, searches: int) -> None:
         self.Q, self._next = Q, None
         self._energy, self._step, self._stale, self._fulls = np.inf, np.inf, 0, 0
-        self._residual, self.searching = np.inf, searches
+        self._residual, self._shown, self.searching = np.inf, np.inf, searches
         self._extent = float(np.ptp(Q))
 
     def _return(self, value: Evaluation, residual: float) -> None:
@@ -153,9 +155,12 @@ class Search:
         found = np.abs(value.gradient)
         before, self._residual = self._residual, residual
         noise = EPSILON * (abs(value.matrix) @ np.abs(self.Q[self.steps.problem.active]))
-        if (found <= np.maximum(noise, self.options.residual * value.force)).all():
-            return True
-        return bool((found <= 8 * noise).all()) and self._residual > 0.5 * before
+        small = bool((found <= np.maximum(noise, self.options.residual * value.force)).all())
+        if not small and (self._residual <= 0.5 * before or (found > 8 * noise).any()):
+            return False
+        # forces are those of the coordinates as they are rounded, so that steps go on telling where residuals cannot
+        shorter, self._shown = size < 0.5 * self._shown, size
+        return size <= SEEN * extent or not shorter
 
     # -- steps
 

@@ -60,7 +60,7 @@ def _smooth_twice(q: Any, p: Any) -> Any:
     P_0_zz = 1 - t7
     h_x0_x0_zz = P_0_zz*t2 + ddV_0_0*t7
     return (
-        k*(t0*t0*t0)/3,
+        (1/3)*k*(t0*t0*t0),
         (
             g_x0_x, g_x0_y, g_x0_z,
         ),

@@ -44,7 +44,7 @@ def _element(q: Any, p: Any) -> Any:
     t12 = (t4*t4) + (t6*t6) + (t7*t7)
     t13 = t10 + t11 + t12
     t14 = (1/t0)
-    t15 = rho/6
+    t15 = (1/6)*rho
     t16 = t14*t15
     t17 = 2*t4
     t18 = 2*t8
@@ -65,7 +65,7 @@ def _element(q: Any, p: Any) -> Any:
     t33 = t21 + t6
     t34 = t23 + t7
     t35 = (w0*w0) + w0*w1 + (w1*w1)
-    t36 = rho/3
+    t36 = (1/3)*rho
     t37 = t14*t36
     t38 = t35*t37
     t39 = -t38

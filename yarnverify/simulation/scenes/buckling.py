@@ -1,4 +1,10 @@
-"""A straight yarn that is pushed at its ends until it buckles, and further."""
+"""A straight yarn that is pushed at its ends until it buckles, and further.
+
+The load is found where the Hessian in doubles loses its stability, and is no better than that matrix: its entries, which
+are rounded, are some 6 (n/pi)^4 times its lowest eigenvalue, 2e6 for n = 80, and coordinates, which are rounded too, make n
+k_s/P units of tension, 1e6 for n = 10 and 1e7 for n = 80. Errors of 6e-12 and 4e-10 are found for these two. A softer yarn
+would tell the load better, and shorten too much for the deflection to be that of a yarn that does not.
+"""
 
 import math
 

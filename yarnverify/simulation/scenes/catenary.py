@@ -1,4 +1,8 @@
-"""A slack yarn between two points."""
+"""A slack yarn between two points.
+
+However stiff, it hangs where the chain does to 1e-12, up to the k_s at which rounding of coordinates makes 1e16 times its
+weight: beyond, coordinates do not tell how it hangs, and it is refused.
+"""
 
 import math
 
@@ -49,9 +53,10 @@ def catenary(
         Known("place of a node, of a yarn", "m", limit, lambda end: end.points[:, [0, 2]], 2, 1e-4,
               floor=chain.tension.max() / k_s),
     ]  # fmt: skip
-    part = np.linspace(0, 1, size + 1)
-    start = fabric.Q.copy()
-    sag = math.sqrt(3 / 8 * (length - span) * length)  # of a parabola about as long as the yarn
-    fabric.points(start)[:] = np.stack([span * part, 0 * part, rise * part - 4 * sag * part * (1 - part)], axis=1)
+    # let go as a V, its sides as steep as each other, in which nothing but the segment at its corner is stretched
+    slope, along, start = math.acos(span / length), np.linspace(0, length, size + 1), fabric.Q.copy()
+    corner = (length - rise / math.sin(slope)) / 2
+    down = math.sin(slope) * np.minimum(along, 2 * corner - along)
+    fabric.points(start)[:] = np.stack([math.cos(slope) * along, 0 * along, -down], axis=1)
     active = fabric.positions(range(1, size), "xz")
     return Static(fabric, terms, active, known, start=start, colour="stretch", view="front")
