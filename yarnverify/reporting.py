@@ -105,7 +105,11 @@ def _page(records: dict[str, Any], out: Path, name: str) -> str:
     from yarnverify.report.html import page
 
     svg = {path.stem: path.read_text(encoding="utf-8") for path in sorted((out / "pictures").glob("*.svg"))}
-    photos, turned, gallery = {}, {}, []
+    drawn = {path.stem: path for path in sorted((out / "pictures").glob("*.png"))}
+    recorded = records.get("simulation") or {}
+    named = [each["result"]["scene"] for part in ("scenes", "shown") for each in recorded.get(part, ())]
+    photos = {scene: drawn[scene].read_bytes() for scene in named if scene in drawn}
+    turned, gallery = {}, []
     for path in sorted((out / "scenes").glob("*/result.json")):
         try:
             gallery.append(json.loads(path.read_text(encoding="utf-8")))

@@ -15,7 +15,15 @@ from yarnverify.symbolic.declare import Energy, load_declarations
 from yarnverify.symbolic.dimensions import dimension_of_unit
 from yarnverify.symbolic.emit import dof_labels, given_symbols, identifier
 from yarnverify.symbolic.printing import LIBRARY, TEMPLATES, statements, text_of, used_functions
-from yarnverify.symbolic.programs import Proved, derived_programs, library_calls, printed_program, promise, proved
+from yarnverify.symbolic.programs import (
+    Proved,
+    derived_programs,
+    library_calls,
+    numbers,
+    printed_program,
+    promise,
+    proved,
+)
 from yarnverify.symbolic.prove import read_with
 from yarnverify.symbolic.steps import Program
 
@@ -150,7 +158,7 @@ def module_text(
     """The text of one kernel module, and its operation counts."""
     dofs = dof_labels(energy.unknowns)
     names = [identifier(parameter.name) for parameter in energy.parameters]
-    functions = [_function(made, len(dofs), variant == "reference") for made in programs]
+    functions = [_function(made, len(dofs), numbers(variant, found) != "float") for made in programs]
     code = "\n".join(line for f in functions for line in (*f["lines"], *f["returned"]))
     tape = used_functions(code, "tape")
     full, upper = f"({len(dofs)}, {len(dofs)}, n)", f"({len(dofs) * (len(dofs) + 1) // 2}, n)"
@@ -186,7 +194,7 @@ def module_text(
         "scaling": "points" if angles_alone else "lengths",
         "portable": not LIBRARY & set(tape),
         "promise": promise(variant, found, bool(LIBRARY & set(tape))),
-        "numbers": "double-double" if variant == "reference" else "float",
+        "numbers": numbers(variant, found),
         "public": (
             ("energy", "(n,)", "Energy of each element", energy.unit, "Array"),
             ("gradient", vector, "Gradient, the negative of the force", f"{energy.unit}/m", "Array"),
