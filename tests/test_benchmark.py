@@ -367,7 +367,10 @@ def test_pinning_is_undone() -> None:
 
 
 BAD = [
-    ({"energy": "bendin"}, "bendin: no such energy; there are bending, parallel_contact, shear, stretch"),
+    (
+        {"energy": "bendin"},
+        "bendin: no such energy; there are bending, gravity, kinetic, parallel_contact, plane, shear, sphere, stretch",
+    ),
     ({"peers": ["torch"]}, "torch: no such peer; there are lambdify, jax, casadi, numba, differences"),
     ({"sizes": [0, 10]}, "sizes must be at least 1, not 0, 10"),
     ({"sizes": []}, "sizes must be at least 1, not none"),

@@ -603,18 +603,3 @@ inline void add_stretch(const Node &a, const Node &b, double k_s, Eigen::VectorX
     }
 }
 """
-
-
-def test_the_example_of_the_readme(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    readme = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
-    source = re.search(r"<!-- mine.py -->\n```\n(.*?)```", readme, re.DOTALL)
-    shown = re.search(r"<!-- output of: yarnverify (check mine.py.*?) -->\n```\n(.*?)```", readme, re.DOTALL)
-    assert source is not None and shown is not None
-    (tmp_path / "mine.py").write_text(source[1])
-    monkeypatch.chdir(tmp_path)
-    assert run(*shown[1].split()) == 1
-    assert shown[2] in capsys.readouterr().out
-    (tmp_path / "mine.py").write_text(source[1].replace("- 1) * w", "- 1) * (x1 - x0) / np.linalg.norm(x1 - x0)"))
-    assert run(*shown[1].split(), "--regime", "moderate") == 0

@@ -11,6 +11,10 @@ import pytest
 import sympy as sp
 
 from tests.variants import kernel
+from yarnverify.accuracy.cells import allowed
+from yarnverify.accuracy.conditioning import condition
+from yarnverify.accuracy.metrics import measure
+from yarnverify.accuracy.truth import Points, truth
 from yarnverify.errors import InputError
 from yarnverify.kernels import gravity, kinetic, plane, sphere
 from yarnverify.library import MAIN_DOCUMENT
@@ -270,6 +274,64 @@ def test_errors_are_those_of_the_inputs(name: str, variant: str) -> None:
             np.abs(x).reshape(-1, q.shape[1]).max(0) for x in exact
         )
         assert (gap <= 16 * u * scale * (1 + (size if name != "kinetic" else 0))).all()
+
+
+HARD = {
+    "moderate": lambda q, slope, draw: {},
+    "the yarn at rest, nodes that slide along it": lambda q, slope, draw: {"v0": q[14] * slope, "v1": q[15] * slope},
+    "at rest but for one end": lambda q, slope, draw: {"v0": q[14] * slope},
+    "nearly at rest": lambda q, slope, draw: {
+        "v0": q[14] * slope * (1 + 10 ** draw.uniform(-16, 0, q.shape[1])), "v1": q[15] * slope * (1 + 1e-9),
+    },
+    "nothing slides": lambda q, slope, draw: {"w0": 0, "w1": 0},
+    "equal velocities": lambda q, slope, draw: {"v1": q[8:11], "w1": q[14]},
+    "nothing moves": lambda q, slope, draw: {"v0": 0, "v1": 0, "w0": 0, "w1": 0},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("state", HARD)
+def test_kinetic_energy_keeps_its_digits_where_velocities_cancel(declarations: Declarations, state: str) -> None:
+    """The target of ``accurate``, 16 u, without a word of condition; ``fast`` is held to that as well by the same rule."""
+    draw = np.random.default_rng(8)
+    q = draw.normal(size=(16, 60))
+    q[7] = q[6] + draw.uniform(0.5, 2, 60)
+    places = {"v0": slice(8, 11), "v1": slice(11, 14), "w0": 14, "w1": 15}
+    for name, value in HARD[state](q.copy(), (q[3:6] - q[:3]) / (q[7] - q[6]), draw).items():
+        q[places[name]] = value
+    points = Points(q, {"rho": draw.uniform(0.1, 2, 60)})
+    each = named(declarations, "kinetic")
+    exact = truth(each, points)
+    for output, found in zip("EGH", kinetic.evaluate(q, **points.parameters), strict=True):
+        assert measure(output, found, exact, each.unknowns, "float64").worst_block.max() <= 16
+    errors = measure("G", kernel("kinetic", "fast").gradient(q, **points.parameters), exact, each.unknowns, "float64")
+    assert (errors.normwise <= allowed(np.nan_to_num(condition("G", each, points, exact)))).all()
+
+
+@pytest.mark.parametrize("variant", ["accurate", "fast"])
+def test_second_derivatives_of_the_kinetic_energy_are_in_lowest_terms(declarations: Declarations, variant: str) -> None:
+    """What the chain rule adds and takes away again is gone, so that nothing is left that cancels whatever the state."""
+    q, parameters = states("kinetic", 60)
+    each = named(declarations, "kinetic")
+    exact = truth(each, Points(q, parameters))
+    errors = measure("H", kernel("kinetic", variant).hessian(q, **parameters), exact, each.unknowns, "float64")
+    by_u = [at for at, block in enumerate(errors.blocks) if {"u0", "u1"} & set(block.split(","))]
+    assert len(by_u) == 15 and errors.normwise[by_u].max() <= 16
+
+
+@pytest.mark.parametrize("state", ["level", "ends opposite", "both"])
+def test_weight_keeps_its_digits_at_any_height(declarations: Declarations, state: str) -> None:
+    q, parameters = states("gravity", 200)
+    draw = np.random.default_rng(9)
+    if state != "level":
+        q[3:6] = -q[:3] * (1 + 1e-12 * draw.normal(size=(3, 200)))
+    if state != "ends opposite":
+        middle, g = q[:3] + q[3:6], parameters["g"]
+        g[2] = -(g[0] * middle[0] + g[1] * middle[1]) / middle[2]
+    each = named(declarations, "gravity")
+    exact = truth(each, Points(q, parameters))
+    assert gravity.KERNEL.promise == "units"
+    for output, found in zip("EGH", gravity.evaluate(q, **parameters), strict=True):
+        assert measure(output, found, exact, each.unknowns, "float64").worst_block.max() <= 16
 
 
 def test_weight_and_momentum() -> None:

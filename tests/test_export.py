@@ -142,8 +142,6 @@ def test_what_cannot_be_exported_says_why(
 ) -> None:
     with pytest.raises(InputError, match="bent: no such energy; there are bending"):
         export("bent", tmp_path, None, 1, False)
-    with pytest.raises(InputError, match="g is a vector"):
-        export("gravity", tmp_path, None, 1, False)
     with pytest.raises(InputError, match="--count 0: give a positive number"):
         export("bending", tmp_path, None, 0, False)
     monkeypatch.setattr("yarnverify.verdicts.verdicts", lambda *_: (record, ""))

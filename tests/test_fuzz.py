@@ -37,7 +37,12 @@ def broken(change: Any, energy: str = "bending", variant: str = "accurate") -> A
 
     energy_.__name__ = "energy"
     return SimpleNamespace(
-        DOFS=good.DOFS, PARAMETERS=good.PARAMETERS, VARIANT=variant, energy=energy_, evaluate=evaluate
+        DOFS=good.DOFS,
+        PARAMETERS=good.PARAMETERS,
+        VARIANT=variant,
+        KERNEL=good.KERNEL,
+        energy=energy_,
+        evaluate=evaluate,
     )
 
 
@@ -70,7 +75,10 @@ def test_every_kind_of_flaw_is_seen(change: Any, kind: str, text: str) -> None:
 def test_numbers_where_there_is_no_value_are_seen() -> None:
     good = kernel("bending", "accurate")
     careless = SimpleNamespace(
-        VARIANT="accurate", energy=good.energy, evaluate=lambda q, **p: tuple(np.nan_to_num(a) for a in loose(q, **p))
+        VARIANT="accurate",
+        KERNEL=good.KERNEL,
+        energy=good.energy,
+        evaluate=lambda q, **p: tuple(np.nan_to_num(a) for a in loose(q, **p)),
     )
 
     def loose(q: Any, **parameters: Any) -> Any:
@@ -118,7 +126,7 @@ def break_near(array: Any, q: Any) -> Any:
 
 
 def search_broken(monkeypatch: pytest.MonkeyPatch, seconds: float = 60.0, most: float = 400) -> search.Search:
-    monkeypatch.setattr(search, "_kernel", lambda energy, variant: broken(break_near))
+    monkeypatch.setattr(search, "_kernel", lambda energy, variant, folder: broken(break_near))
     return search.search("bending", "accurate", seconds, 1, most=most)
 
 
@@ -182,7 +190,7 @@ def test_what_was_found_is_kept_on_an_interrupt(monkeypatch: pytest.MonkeyPatch)
         if not label.endswith(" 0 found"):
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(search, "_kernel", lambda energy, variant: broken(lambda array, q: array * 2, energy))
+    monkeypatch.setattr(search, "_kernel", lambda energy, variant, folder: broken(lambda array, q: array * 2, energy))
     lines, record = command.fuzz(None, "accurate", 1000.0, 1, interrupt)
     assert len(record) == 1 and record[0]["found"]
     assert lines[-1] == "interrupted; not run: bending, shear, parallel_contact"

@@ -246,6 +246,12 @@ def test_committed_pages_are_what_the_records_give(report: Path) -> None:
         assert (report / name).read_bytes() == (committed / name).read_bytes(), f"{name} differs: run yarnverify report"
 
 
+def test_the_html_report_shows_the_scenes_as_the_pages_do(report: Path) -> None:
+    page = (report / "report.html").read_text(encoding="utf-8")
+    for scene in ("a cloth hung by two corners", "a cloth draped over a sphere", "a yarn pulled out of a cloth"):
+        assert f'alt="The end of the scene: {scene}"' in page
+
+
 def test_a_damaged_page_is_shown(report: Path, tmp_path: Path) -> None:
     copy = shutil.copytree(report, tmp_path / "copy")
     page = copy / "bending.md"

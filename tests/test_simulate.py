@@ -128,10 +128,29 @@ def test_pictures(tmp_path: Path) -> None:
         assert (tmp_path / name).stat().st_size > 1000 and name in lines[-1]
 
 
-def test_the_scene_of_the_readme_comes_out_as_known(tmp_path: Path) -> None:
-    readme = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+SCENE = """
+from yarnverify.kernels import stretch
+from yarnverify.simulation.assembly import Term
+from yarnverify.simulation.fabric import segments, yarn
+from yarnverify.simulation.quantities import positive
+from yarnverify.simulation.scene import scene
+from yarnverify.simulation.setting import Known, Stage, Static
+
+
+@scene(title="a yarn that is pulled", size="segments", sizes=(2, 4, 8), source="Hooke's law", wall="at the first node")
+def pulled(size: int, k_s: float = positive(50.0, "N", "a cotton yarn"), force: float = positive(1.0, "N")) -> Static:
+    fabric = yarn(0.1, size)
+    loads = 0 * fabric.Q
+    loads[fabric.position(size)[0, 0]] = force
+    longer = Known("length", "m", 0.1 * (1 + force / k_s), lambda end: end.points[-1, 0])
+    unknown = fabric.positions(range(1, size + 1))
+    return Static(fabric, [Term(stretch, segments(fabric), {"k_s": k_s})], unknown, [longer], [Stage(loads)])
+"""
+
+
+def test_a_scene_in_a_file_comes_out_as_known(tmp_path: Path) -> None:
     path = tmp_path / "my_scene.py"
-    path.write_text(readme.split("<!-- my_scene.py -->\n```\n")[1].split("```")[0], encoding="utf-8")
+    path.write_text(SCENE, encoding="utf-8")
     found, _ = run(str(path), given=("force=2.5 N",))
     assert found.missed == [] and found.result["lines"][0]["runs"][0]["answers"][0]["exact"] == pytest.approx(0.105)
 

@@ -15,7 +15,7 @@ from cyclopts import App
 from yarnverify import __version__
 from yarnverify.commands.implementations import check, export
 from yarnverify.commands.measurements import accuracy, benchmark, fuzz
-from yarnverify.commands.proofs import derive, generate, init, prove, report
+from yarnverify.commands.proofs import derive, generate, init, prove, report, tutorial
 from yarnverify.commands.shared import stop
 from yarnverify.commands.simulations import analyse, simulate
 
@@ -24,7 +24,9 @@ app = App(
     version=__version__,
     help="Proofs for printed yarn energies, forces and Jacobians, and NumPy kernels derived from them.",
 )
-for command in (init, prove, derive, generate, check, export, accuracy, benchmark, fuzz, simulate, analyse, report):
+for command in (
+    init, prove, derive, generate, check, export, accuracy, benchmark, fuzz, simulate, analyse, report, tutorial,
+):  # fmt: skip
     app.command(command)
 
 

@@ -46,6 +46,11 @@ class Project:
         """The folder as seen from its reports, for links."""
         return ".." if self.own else "../derivations"
 
+    @property
+    def prefix(self) -> str:
+        """What stands before an energy's name on a command line."""
+        return f"{self.name}/" if self.own else ""
+
     def command(self, words: str) -> str:
         """A command line for this folder: ``yarnverify prove`` becomes ``yarnverify prove NAME``."""
         return f"{words} {self.name}".strip()

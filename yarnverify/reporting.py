@@ -16,7 +16,14 @@ from yarnverify.reference import reference
 from yarnverify.show import mistake_lines, tally_lines
 from yarnverify.verdicts import nothing_printed, verdicts
 
-MEASURED = ("accuracy", "benchmark", "analysis", "simulation", "simulation-speed")  # of commands of their own
+MEASURED = (
+    "accuracy",
+    "benchmark",
+    "analysis",
+    "simulation",
+    "simulation-speed",
+    "tutorial",
+)  # of commands of their own
 
 COMMANDS = {
     "accuracy": "yarnverify accuracy --write",
@@ -24,6 +31,7 @@ COMMANDS = {
     "analysis": "yarnverify analyse --write",
     "simulation": "yarnverify simulate --write",
     "simulation-speed": "yarnverify benchmark simulation --json reports/records/simulation-speed.json",
+    "tutorial": "yarnverify tutorial --write",
 }
 
 
@@ -97,7 +105,11 @@ def _page(records: dict[str, Any], out: Path, name: str) -> str:
     from yarnverify.report.html import page
 
     svg = {path.stem: path.read_text(encoding="utf-8") for path in sorted((out / "pictures").glob("*.svg"))}
-    photos, turned, gallery = {}, {}, []
+    drawn = {path.stem: path for path in sorted((out / "pictures").glob("*.png"))}
+    recorded = records.get("simulation") or {}
+    named = [each["result"]["scene"] for part in ("scenes", "shown") for each in recorded.get(part, ())]
+    photos = {scene: drawn[scene].read_bytes() for scene in named if scene in drawn}
+    turned, gallery = {}, []
     for path in sorted((out / "scenes").glob("*/result.json")):
         try:
             gallery.append(json.loads(path.read_text(encoding="utf-8")))

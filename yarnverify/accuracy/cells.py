@@ -137,9 +137,10 @@ def compute(module: Any, points: Points, exact: Truth, dtype: str) -> tuple[dict
     whole = exact.has_derivatives & fits(exact.energy) & fits(exact.gradient) & fits(exact.hessian)
     if not whole.all():
         rest = ~whole
-        e[rest] = module.energy(q[:, rest], **{k: v[rest] for k, v in parameters.items()}, errors="mask")
-        g[:, rest] = module.gradient(q[:, rest], **{k: v[rest] for k, v in parameters.items()}, errors="mask")
-        h[..., rest] = module.hessian(q[:, rest], **{k: v[rest] for k, v in parameters.items()}, errors="mask")
+        few = {name: value[..., rest] for name, value in parameters.items()}
+        e[rest] = module.energy(q[:, rest], **few, errors="mask")
+        g[:, rest] = module.gradient(q[:, rest], **few, errors="mask")
+        h[..., rest] = module.hessian(q[:, rest], **few, errors="mask")
         invented |= ~exact.has_energy & np.isfinite(e)
     return {"E": e, "G": g, "H": h}, invented
 
@@ -381,6 +382,9 @@ def short_hex(value: float) -> str:
 
 def replay_text(energy: str, variant: str, dtype: str, points: Points, at: int) -> str:
     """One state as text: what ``yarnverify accuracy --replay`` reads."""
-    coordinates = ",".join(short_hex(value) for value in points.q[:, at])
-    parameters = " ".join(f"{name}={short_hex(value[at])}" for name, value in points.parameters.items())
-    return f"{energy} {variant} {dtype} {coordinates} {parameters}"
+
+    def numbers(values: Array) -> str:
+        return ",".join(map(short_hex, np.atleast_1d(values)))
+
+    parameters = " ".join(f"{name}={numbers(value[..., at])}" for name, value in points.parameters.items())
+    return f"{energy} {variant} {dtype} {numbers(points.q[:, at])} {parameters}"

@@ -63,17 +63,21 @@ class Regime:
 
 
 def regimes(energy: Energy) -> tuple[Regime, ...]:
-    """The regimes of an energy, in reading order."""
+    """The regimes of an energy, in reading order; moderate states alone where a parameter is a vector."""
+    if vector_parameters(energy):  # what is hard about a vector is not known
+        return tuple(regime for regime in REGIMES if regime.values is _moderate)
     shape = shape_of(energy)
     return tuple(regime for regime in REGIMES if regime.applies(shape))
 
 
+def vector_parameters(energy: Energy) -> list[str]:
+    """Names of the parameters that are vectors."""
+    return [parameter.label for parameter in energy.parameters if parameter.name.bold]
+
+
 def not_drawn(energy: Energy) -> str:
     """Why no hard cases are drawn for an energy; empty where they are."""
-    vectors = [parameter.name.label for parameter in energy.parameters if parameter.name.bold]
     moving = [name.label for name, unit in zip(energy.unknowns, energy.units, strict=True) if unit != "m"]
-    if vectors:
-        return f"no hard cases are drawn for vector parameters ({', '.join(vectors)})"
     return f"no hard cases are drawn for velocities ({', '.join(moving)})" if moving else ""
 
 
@@ -383,6 +387,8 @@ _OCTAVES = 50  # 2^-50 is about 1e-15
 def curves(energy: Energy) -> tuple[str, ...]:
     """What the error of an energy is followed towards: an angle of 0, of pi, a right angle, or the state of rest."""
     shape = shape_of(energy)
+    if vector_parameters(energy):
+        return ()
     if shape.angle:
         return ("0", "pi", "right angle")
     return ("rest",) if shape.rest() is not None else ()

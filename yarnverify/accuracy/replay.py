@@ -25,29 +25,38 @@ def parse_replay(text: str, folder: Path) -> tuple[Any, str, str, Points]:
     """
     words = text.split()
     if len(words) < 4 or any("=" not in word for word in words[4:]):
-        raise InputError(f"--replay {text!r}: give ENERGY VARIANT TYPE q0,q1,... name=value ...")
+        raise InputError(
+            f"--replay {text!r}: give ENERGY VARIANT TYPE q0,q1,... name=value ..., and name=x,y,z for a vector"
+        )
     energy, variant, dtype = declared_energy(words[0], folder), words[1], words[2]
     if dtype not in UNIT:
         raise InputError(f"--replay: {dtype}: no such type; there are {', '.join(UNIT)}")
     try:
-        coordinates = [_number(part) for part in words[3].split(",")]
-        given = {name: _number(value) for name, _, value in (word.partition("=") for word in words[4:])}
+        coordinates = _numbers(words[3])
+        given = {name: _numbers(value) for name, _, value in (word.partition("=") for word in words[4:])}
     except ValueError as error:
         raise InputError(f"--replay: {error}") from None
-    names = [parameter.label for parameter in energy.parameters]
-    dof = len(rows_of(energy)) - len(names)
+    sizes = {parameter.label: 3 if parameter.name.bold else 1 for parameter in energy.parameters}
+    names = list(sizes)
+    dof = len(rows_of(energy)) - sum(sizes.values())
     if len(coordinates) != dof:
         raise InputError(f"--replay: {energy.name} has {dof} coordinates, not {len(coordinates)}")
     if set(given) != set(names):
         raise InputError(
             f"--replay: {energy.name} has the parameters {', '.join(names)}, not {', '.join(given) or 'none'}"
         )
+    for name, size in sizes.items():
+        if len(given[name]) != size:
+            raise InputError(f"--replay: {name} is {'a vector, x,y,z' if size == 3 else 'one number'}")
     q = np.array(coordinates)[:, None].astype(dtype).astype(float)
-    return energy, variant, dtype, Points(q, {name: np.array([given[name]]) for name in names})
+    values = {
+        name: np.array(given[name])[:, None] if size == 3 else np.array(given[name]) for name, size in sizes.items()
+    }
+    return energy, variant, dtype, Points(q, values)
 
 
-def _number(text: str) -> float:
-    return float.fromhex(text) if "x" in text else float(text)
+def _numbers(text: str) -> list[float]:
+    return [float.fromhex(part) if "x" in part else float(part) for part in text.split(",")]
 
 
 def replay(text: str, folder: Path, kernels: str = "") -> dict[str, Any]:

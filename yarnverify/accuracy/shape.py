@@ -90,7 +90,9 @@ def shape_of(energy: Energy) -> Shape:
             pairs.append(list(vectors))
     pair = next((pair for pair in pairs if len(pair) == 2 and all(_edge(forms[name]) for name in pair)), [])
     order = [*pair, *(name for name in forms if name.bold and name not in pair)]
-    edges = tuple(edge for name in order if (edge := _edge(forms[name])) is not None)
+    found = (_edge(forms[name]) for name in order)
+    points = set(energy.unknowns)  # a parameter may be a vector too, and is no end of an edge
+    edges = tuple(edge for edge in found if edge is not None and {edge.head, edge.tail} <= points)
     parameters = [(parameter.label, parameter.unit) for parameter in energy.parameters]
     others = [(name, unit) for name, unit in parameters if unit not in ("m", "1", "rad")]
     return Shape(

@@ -10,9 +10,11 @@ from typing import Any
 from yarnverify.benchmark.peers import PEERS
 from yarnverify.benchmark.run import ROUNDS, SIZES, benchmark
 from yarnverify.errors import InputError, NotRunError, why
+from yarnverify.project import Project
 
 
 def measure(
+    of: Project,
     energy: str | None,
     sizes: Sequence[int] | None,
     peers: Sequence[str] | None,
@@ -32,7 +34,7 @@ def measure(
     """
     draw = None if pictures is None else _drawing(pictures)
     named = PEERS if peers is None else () if list(peers) == ["none"] else tuple(dict.fromkeys(peers))
-    record = benchmark(energy, sizes or SIZES, named, threads, ROUNDS if rounds is None else rounds, advance)
+    record = benchmark(energy, sizes or SIZES, named, threads, ROUNDS if rounds is None else rounds, advance, of=of)
     if draw is not None:
         for name in record["energies"]:
             draw(record, name)

@@ -8,11 +8,13 @@ from __future__ import annotations
 import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from yarnverify.accuracy.cells import kernel
 from yarnverify.benchmark.peers import PEERS
-from yarnverify.benchmark.ways import Array, Outputs, Way, degrees_of_freedom, kept_outputs, outputs_bytes
-from yarnverify.errors import NotRunError
+from yarnverify.benchmark.ways import Array, Outputs, Way, degrees_of_freedom, kept_outputs, named, outputs_bytes
+from yarnverify.errors import InputError, NotRunError
 from yarnverify.kernels import VARIANTS
 from yarnverify.symbolic.declare import Energy
 
@@ -30,7 +32,7 @@ class Contestant:
 
 
 def contestants(
-    energy: Energy, peers: Sequence[str] = PEERS, threads: int = 1
+    energy: Energy, peers: Sequence[str] = PEERS, threads: int = 1, folder: Path | None = None
 ) -> tuple[list[Contestant], dict[str, str]]:
     """Those that can run, and why the others cannot.
 
@@ -42,12 +44,14 @@ def contestants(
         Names out of ``PEERS``.
     threads
         For the kernels; the others run on one.
+    folder
+        Of your own derivations, with the kernels that were generated for them.
     """
     found: list[Contestant] = []
     missing: dict[str, str] = {}
     for name in (*kernels(), *peers):
         try:
-            found += _peer(energy, name) if name in peers else [_kernel(energy, name, threads)]
+            found += _peer(energy, name) if name in peers else [_kernel(energy, name, threads, folder)]
         except ImportError as error:
             missing[name] = f"{error.name or error} is not installed"
         except NotRunError as error:
@@ -68,15 +72,12 @@ def failure(error: BaseException) -> str:
     return f"{type(error).__name__}: {text[:200]}" if text else type(error).__name__
 
 
-def _kernel(energy: Energy, name: str, threads: int) -> Contestant:
+def _kernel(energy: Energy, name: str, threads: int, folder: Path | None) -> Contestant:
     variant, _, engine = name.partition(" ")
-    place = f"yarnverify.kernels.{variant}.{energy.name}"
     try:
-        module: Any = importlib.import_module(place)
-    except ModuleNotFoundError as error:
-        if error.name and place.startswith(error.name):
-            raise NotRunError("has no kernel of this energy") from None
-        raise
+        module = kernel(variant, energy.name, folder or "")
+    except InputError:
+        raise NotRunError("has no kernel of this energy") from None
     if engine:
         importlib.import_module("numba")
     options: dict[str, Any] = {"threads": threads, "engine": engine or "numpy"}
@@ -85,8 +86,8 @@ def _kernel(energy: Energy, name: str, threads: int) -> Contestant:
     arrays = kept_outputs(dof)
 
     def run(q: Array, values: tuple[float, ...]) -> Outputs:
-        named = dict(zip(module.PARAMETERS, values, strict=True))
-        outputs: Outputs = module.packed(q, **named, errors="mask", out=arrays(q.shape[1]), **options)
+        given = named(energy, values)
+        outputs: Outputs = module.packed(q, **given, errors="mask", out=arrays(q.shape[1]), **options)
         return outputs
 
     how = f"{'compiled by numba' if engine else 'NumPy'}, {threads} thread{'s' * (threads > 1)}"

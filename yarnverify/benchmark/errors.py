@@ -10,15 +10,15 @@ import numpy as np
 from yarnverify.accuracy.metrics import measure
 from yarnverify.accuracy.truth import Points, Truth, truth
 from yarnverify.benchmark.inputs import Inputs, error_states
-from yarnverify.benchmark.ways import Way, unified
+from yarnverify.benchmark.ways import Way, named, unified
 from yarnverify.symbolic.declare import Energy
 
 
 def exact(energy: Energy, inputs: Inputs) -> Truth:
     """The exact result at given states."""
+    values = named(energy, inputs.parameters)
     n = inputs.q.shape[1]
-    named = zip(energy.parameters, inputs.parameters, strict=True)
-    return truth(energy, Points(inputs.q, {str(p.name): np.full(n, value) for p, value in named}))
+    return truth(energy, Points(inputs.q, {name: np.repeat(value[..., None], n, -1) for name, value in values.items()}))
 
 
 def errors_of(energy: Energy, ways: Mapping[str, Way], points: int) -> dict[str, dict[str, Any]]:

@@ -14,26 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.benchmark.peers.walk import Functions, scalar_of, values_of, vector_of
-from yarnverify.benchmark.ways import degrees_of_freedom
+from yarnverify.benchmark.peers.walk import functions_of, scalar_of, values_of, vector_of
+from yarnverify.benchmark.ways import count_of_parameters, degrees_of_freedom
 from yarnverify.symbolic.declare import Energy
 from yarnverify.symbolic.tree import Expr
 
 Array = NDArray[Any]
-FUNCTIONS = Functions(
-    float,
-    np.pi,
-    np.sqrt,
-    np.abs,
-    {
-        "arccos": np.arccos,
-        "arcsin": np.arcsin,
-        "arctan": np.arctan,
-        "sin": np.sin,
-        "cos": np.cos,
-        "tan": np.tan,
-    },
-)
+FUNCTIONS = functions_of(np, float, short=False)
 STATES = ("mixed", "near rest")
 HARD = {"1e-4": 1e-4, "1e-8": 1e-8}  # distances, as they are written and as numbers
 MARGIN = 0.05  # by which ordinary states stay inside the domain
@@ -48,7 +35,7 @@ class Inputs:
     q
         (dof, n).
     parameters
-        In the declared order.
+        In the declared order, three numbers for a vector.
     """
 
     q: Array
@@ -92,13 +79,14 @@ def error_states(energy: Energy, n: int = 32, seed: int = 0) -> dict[str, Inputs
 
 def _mixed(energy: Energy, n: int, draw: np.random.Generator) -> Inputs:
     dof = degrees_of_freedom(energy)
-    parameters = tuple(float(value) for value in draw.uniform(0.5, 2, len(energy.parameters)))
+    parameters = tuple(float(value) for value in draw.uniform(0.5, 2, count_of_parameters(energy)))
     return _inside(energy, n, parameters, lambda count: draw.uniform(-1, 1, (dof, count)), MARGIN)
 
 
 def _near_rest(energy: Energy, n: int, draw: np.random.Generator, sizes: Callable[[int], Array]) -> Inputs:
     rest = [energy.rest.get(name.label, 0) for name in energy.unknowns]
-    parameters = tuple(float(energy.rest.get(str(p.name), energy.rest.get(p.name.label, 1))) for p in energy.parameters)
+    given = (np.atleast_1d(energy.rest.get(p.label, (0, 0, 1) if p.name.bold else 1)) for p in energy.parameters)
+    parameters = tuple(float(value) for values in given for value in values)
 
     def drawn(count: int) -> Array:
         turn, size = _rotations(count, draw), sizes(count)

@@ -7,19 +7,21 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from yarnverify.accuracy.cells import has_kernel
 from yarnverify.benchmark.contestants import Contestant, contestants, failure
 from yarnverify.benchmark.inputs import STATES, Inputs, timed_states
 from yarnverify.benchmark.peers import PEERS
 from yarnverify.benchmark.timing import Clock, Spread, paired, speedups, spread, warm
 from yarnverify.benchmark.ways import Way, degrees_of_freedom, outputs_bytes
-from yarnverify.errors import InputError
-from yarnverify.library import derivations
+from yarnverify.errors import InputError, NotRunError
 from yarnverify.machine import environment
+from yarnverify.project import Project, project
 from yarnverify.symbolic.declare import Energy, load_declarations
 
 SIZES = (1, 10, 100, 1000, 10_000, 100_000, 1_000_000)
@@ -41,13 +43,14 @@ def benchmark(
     rounds: int = ROUNDS,
     advance: Advance = lambda label, total: None,
     points: int = 32,
+    of: Project | None = None,
 ) -> dict[str, Any]:
     """Measure one declared energy or all.
 
     Parameters
     ----------
     energy
-        Its name; None for all.
+        Its name; None for all of a folder of your own, or those of the package's document.
     sizes
         Batch sizes, elements.
     peers
@@ -60,6 +63,8 @@ def benchmark(
         Called as each step is done.
     points
         States of each kind on which errors are taken.
+    of
+        Whose energies; those of the package by default.
 
     Returns
     -------
@@ -71,23 +76,27 @@ def benchmark(
     InputError
         For an unknown energy or peer, and numbers out of range.
     """
-    declared = [each for each in load_declarations(derivations()).energies if each.document]
-    chosen = [each for each in declared if energy in (None, each.name)]
+    of = of or project()
+    declared = load_declarations(of.folder).energies
+    chosen = [each for each in declared if each.name == energy or (energy is None and (of.own or each.document))]
     if not chosen:
         raise InputError(f"{energy}: no such energy; there are {', '.join(each.name for each in declared)}")
+    folder = of.folder if of.own else None
+    if folder is not None and not any(has_kernel("fast", each.name, folder) for each in chosen):
+        raise NotRunError(f"{of.name}: has no kernels of these; they are made by: {of.command('yarnverify generate')}")
     _check(sizes, peers, threads, rounds)
     sizes = sorted(set(sizes))
     # one thread waits for nobody, so that its processor time is its wall time less what other programs took
     clock = time.process_time if threads == 1 else time.perf_counter
     with pinned(threads) as processors:
         found = {
-            each.name: _measure(each, sizes, peers, threads, rounds, points, clock, advance, len(chosen))
+            each.name: _measure(each, sizes, peers, threads, rounds, points, clock, advance, len(chosen), folder)
             for each in chosen
         }
     packages = sorted({package for each in found.values() for package in each.pop("packages")})
     return {
         "schema": 1,
-        "command": _command(energy, sizes, peers, threads, rounds),
+        "command": _command(of.prefix + energy if energy else of.name, sizes, peers, threads, rounds),
         "environment": environment(packages, processors),
         "threads": threads,
         "clock": "wall time" if clock is time.perf_counter else "processor time",
@@ -108,7 +117,7 @@ def _check(sizes: Sequence[int], peers: Sequence[str], threads: int, rounds: int
         raise InputError(f"rounds must be at least 1, not {rounds}")
 
 
-def _command(energy: str | None, sizes: Sequence[int], peers: Sequence[str], threads: int, rounds: int) -> str:
+def _command(energy: str, sizes: Sequence[int], peers: Sequence[str], threads: int, rounds: int) -> str:
     parts = ["yarnverify benchmark", *([energy] if energy else [])]
     if tuple(sizes) != SIZES:
         parts.append(f"--sizes {' '.join(map(str, sizes))}")
@@ -146,10 +155,11 @@ def _measure(
     clock: Clock,
     advance: Advance,
     energies: int,
+    folder: Path | None,
 ) -> dict[str, Any]:
     from yarnverify.benchmark.errors import errors_of
 
-    able, missing = contestants(energy, peers, threads)
+    able, missing = contestants(energy, peers, threads, folder)
     steps = energies * (len(able) + len(missing) + len(STATES) * len(sizes) + 1)
     tuned = timed_states(energy, STATES[0], min(max(sizes), TUNED_AT))
     chosen: dict[str, Way] = {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -29,7 +29,7 @@ class Way:
     layout
         ``component-first``, (dof, n), or ``element-first``, (n, dof): whichever is faster for the contestant.
     run
-        Takes ``q`` (dof, n) and the parameters as a tuple of floats; gives energy, gradient and Hessian.
+        Takes ``q`` (dof, n) and the parameters as a tuple of floats, three for a vector; gives energy, gradient and Hessian.
     bytes_at
         Memory in bytes that a call with so many elements needs at its peak, about.
     """
@@ -100,3 +100,18 @@ def unified(way: Way, outputs: Outputs) -> Outputs:
 def degrees_of_freedom(energy: Any) -> int:
     """Rows of q of a declared energy."""
     return sum(3 if name.bold else 1 for name in energy.unknowns)
+
+
+def count_of_parameters(energy: Any) -> int:
+    """Numbers that its parameters are, three of a vector."""
+    return sum(3 if parameter.name.bold else 1 for parameter in energy.parameters)
+
+
+def named(energy: Any, parameters: Sequence[float]) -> dict[str, Array]:
+    """Parameters by name, () or (3,), from all their numbers."""
+    found, at = {}, 0
+    for parameter in energy.parameters:
+        size = 3 if parameter.name.bold else 1
+        found[parameter.label] = np.array(parameters[at : at + size] if size == 3 else parameters[at])
+        at += size
+    return found

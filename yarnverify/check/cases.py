@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from yarnverify.accuracy.cells import AMPLIFIED
 from yarnverify.accuracy.conditioning import condition, hessian_condition
 from yarnverify.accuracy.metrics import UNIT, blocks_of, slices
-from yarnverify.accuracy.regimes import points_of, regimes
+from yarnverify.accuracy.regimes import points_of, regimes, vector_parameters
 from yarnverify.accuracy.shape import shape_of
 from yarnverify.accuracy.truth import Points, Truth, truth
 from yarnverify.errors import InputError
@@ -157,11 +157,6 @@ def energy_named(name: str, folder: Path | None) -> Energy:
     return energy
 
 
-def vector_parameters(energy: Energy) -> list[str]:
-    """Names of the parameters that are vectors."""
-    return [parameter.label for parameter in energy.parameters if parameter.name.bold]
-
-
 def _from_rows(rows: Array, like: Points) -> Points:
     """Points from their coordinates and parameters, one below the other."""
     parameters, at = {}, len(like.q)
@@ -205,8 +200,6 @@ def hard_cases(
     """
     energy = energy_named(name, folder)
     there = regimes(energy)
-    if vector_parameters(energy):  # what is hard about a vector is not known
-        there = tuple(regime for regime in there if regime.name == "moderate")
     unknown = [w for w in wanted if w not in [regime.name for regime in there]]
     if unknown:
         raise InputError(

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.check.cases import Cases, vector_parameters
+from yarnverify.accuracy.regimes import vector_parameters
+from yarnverify.check.cases import Cases
 from yarnverify.check.conventions import Convention, Results, decoded
 from yarnverify.check.hints import factor_hints, order_hint, sign_hints
 from yarnverify.check.judge import Block, judged, narrowed

@@ -85,10 +85,12 @@ def benchmark(
     Parameters
     ----------
     energy
-        Name of a declared energy, such as bending; all by default. Or simulation: an iteration on cloth of so many crossings
-        (--sizes; 10^2 to 10^5), and a cantilever beside jax and elastica (--peers).
+        Name of a declared energy, such as bending; a folder with energies of your own, or one of them as FOLDER/NAME; those of
+        the document by default. Or simulation: an iteration on cloth of so many crossings (--sizes; 10^2 to 10^5), and a
+        cantilever beside jax and elastica (--peers).
     """
     from yarnverify.benchmark.command import measure, measure_simulation
+    from yarnverify.project import find
 
     if energy == "simulation" and threads != 1:
         stop("simulations run on one thread: leave --threads out", 2)
@@ -96,7 +98,7 @@ def benchmark(
         record, asked_and_missing = (
             measure_simulation(sizes, peers, rounds, pictures, advance)
             if energy == "simulation"
-            else measure(energy, sizes, peers, threads, rounds, pictures, advance)
+            else measure(*find(energy), sizes, peers, threads, rounds, pictures, advance)
         )
     if not write_json(record, json_file):
         from yarnverify.benchmark.show import show_benchmark
@@ -120,9 +122,11 @@ def fuzz(
     Parameters
     ----------
     energy
-        Name of an energy, such as bending; all of them by default.
+        Name of an energy, such as bending; a folder with energies of your own, or one of them as FOLDER/NAME.
+        Those of the document by default.
     """
     from yarnverify.errors import NotRunError
+    from yarnverify.project import find
 
     try:
         from yarnverify.fuzzing.command import fuzz as run
@@ -132,7 +136,8 @@ def fuzz(
         raise NotRunError("the search needs Hypothesis: pip install 'yarnverify[fuzz]'") from None
 
     with progress("searching") as advance:
-        lines, record = run(energy, variant, time, seed, advance)
+        of, name = find(energy)
+        lines, record = run(name, variant, time, seed, advance, of)
     shown = sys.stderr if write_json(record, json_file) else sys.stdout
     for line in lines:
         print(line, file=shown)

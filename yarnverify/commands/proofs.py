@@ -1,4 +1,4 @@
-"""Commands on documents and energies: ``init``, ``prove``, ``derive``, ``generate``, ``report``."""
+"""Commands on documents and energies: ``init``, ``prove``, ``derive``, ``generate``, ``report``, ``tutorial``."""
 
 from __future__ import annotations
 
@@ -153,3 +153,25 @@ def report(
     if annotations:
         outcome.lines += ci.workflow_commands(found, path)
     finish(outcome, json_file)
+
+
+def tutorial(
+    folder: Path | None = None,
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="Folder of reports that holds the record.")] = Path("reports"),
+    write: Annotated[bool, Parameter(negative="", help="Write the record.")] = False,
+    check: Annotated[bool, Parameter(negative="", help="Compare with the record instead of showing the page.")] = False,
+) -> None:
+    """Run the tutorial, all its commands and examples, and show it with what they print.
+
+    Parameters
+    ----------
+    folder
+        A new folder that keeps the files of the tutorial; none are kept without.
+    """
+    from yarnverify.tutorial import tutorial as run
+
+    with progress("running") as advance:
+        outcome = run(folder, out, write, check, advance)
+    finish(outcome, None)

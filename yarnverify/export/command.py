@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from yarnverify.check.cases import energy_named, vector_parameters
+from yarnverify.check.cases import energy_named
 from yarnverify.errors import InputError, NotRunError, why
 from yarnverify.export.formulas import latex_text
 from yarnverify.export.vectors import golden_vectors
@@ -22,7 +22,7 @@ def export(
     Parameters
     ----------
     name, folder
-        Of a declared energy with scalar parameters, and where it is declared.
+        Of a declared energy, and where it is declared.
     out
         Folder for the files.
     count, extreme
@@ -41,10 +41,6 @@ def export(
         raise InputError(f"--count {count}: give a positive number")
     place = folder or derivations()
     energy = energy_named(name, folder)
-    if vector_parameters(energy):
-        raise InputError(
-            f"{name}: {', '.join(vector_parameters(energy))} is a vector; golden vectors have scalar parameters"
-        )
     vectors = golden_vectors(name, folder, count, extreme, advance)
     what = f"{len(vectors)} states"
     files = {

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from yarnverify.accuracy.metrics import blocks_of
 from yarnverify.check.cases import Cases, hard_cases
-from yarnverify.symbolic.emit import dof_labels
+from yarnverify.check.conventions import by_component
+from yarnverify.symbolic.emit import dof_labels, given_symbols
 
 Array = NDArray[Any]
 Advance = Callable[[str, int], None]
@@ -27,11 +28,11 @@ class Vectors:
     energy, summary, unit
         Which energy.
     rows, parameters, units
-        Names of the entries of a state and of the parameters; units of the parameters.
+        Names of the entries of a state and of the parameters, a vector's components by themselves; units of the parameters.
     tags
         (n,) hard case and number.
     q, values
-        (n, dof), and (n,) by parameter.
+        (n, dof), and (n,) by parameter or component.
     energies, gradients, hessians
         (n,), (n, dof), (n, dof, dof): rounded to nearest; NaN where there is no value, infinite where it does not fit.
     blocks
@@ -67,7 +68,7 @@ def golden_vectors(
     Parameters
     ----------
     name, folder
-        Of a declared energy with scalar parameters, and where it is declared.
+        Of a declared energy, and where it is declared.
     count
         States of each hard case.
     extreme
@@ -76,7 +77,7 @@ def golden_vectors(
     Raises
     ------
     InputError
-        Where there is no such energy, or it has vector parameters.
+        Where there is no such energy.
     """
     cases = hard_cases(name, folder, "float64", count, (), extreme)
     energy, truth = cases.energy, cases.truth
@@ -88,16 +89,18 @@ def golden_vectors(
         if truth.has_derivatives[at]:
             _conditions(cases, at, found)
         advance("conditions", len(cases))
+    parts = by_component(cases.points.parameters, axis=0)
+    values = {part.replace(".", "_"): value for part, value in parts.items()}  # as the C source calls them
     return Vectors(
         energy.name,
         energy.summary,
         energy.unit,
         dof_labels(energy.unknowns),
-        tuple(cases.points.parameters),
-        tuple(parameter.unit for parameter in energy.parameters),
+        tuple(values),
+        tuple(parameter.unit for parameter in energy.parameters for _ in given_symbols(parameter.name)),
         cases.tags,
         np.ascontiguousarray(cases.points.q.T),
-        dict(cases.points.parameters),
+        values,
         truth.energy,
         np.ascontiguousarray(truth.gradient.T),
         np.ascontiguousarray(np.moveaxis(truth.hessian, -1, 0)),

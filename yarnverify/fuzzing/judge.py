@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -32,7 +33,7 @@ class Limit:
     conditioning: float = 0.0
 
 
-# Variants that promise nothing are held to what plain arithmetic on safe formulas can reach.
+# Kernels that promise less, or nothing, are held to what plain arithmetic on safe formulas can reach.
 _PLAIN = Limit(16.0, 8.0)
 LIMITS = {"accurate": Limit(16.0), "fast": _PLAIN, "reference": Limit(1.0)}
 
@@ -68,14 +69,14 @@ class Judgement:
     worst: float
 
 
-def limit_of(variant: str) -> Limit:
-    """The limit of a variant, in the range that it is made for."""
-    return LIMITS.get(variant, _PLAIN)
+def limit_of(module: Any) -> Limit:
+    """The limit of a kernel, in the range that it is made for."""
+    return LIMITS.get(module.VARIANT, _PLAIN) if module.KERNEL.promise == "units" else _PLAIN
 
 
 @cache
-def declared(name: str) -> Energy:
-    """The declared energy of a kernel.
+def declared(name: str, folder: Path | None = None) -> Energy:
+    """The declared energy of a kernel, of the package or of a folder of your own.
 
     Raises
     ------
@@ -85,7 +86,7 @@ def declared(name: str) -> Energy:
     from yarnverify.library import derivations
     from yarnverify.symbolic.declare import load_declarations
 
-    energies = {energy.name: energy for energy in load_declarations(derivations()).energies}
+    energies = {energy.name: energy for energy in load_declarations(folder or derivations()).energies}
     if name not in energies:
         raise InputError(f"there is no energy {name!r}; one of {', '.join(sorted(energies))}")
     return energies[name]
@@ -96,7 +97,7 @@ def points_of(elements: Iterable[Element]) -> Points:
     given = list(elements)
     dtype = given[0].q.dtype
     names = given[0].parameters
-    parameters = {name: np.array([one.parameters[name] for one in given]).astype(dtype) for name in names}
+    parameters = {name: np.array([one.parameters[name] for one in given]).T.astype(dtype) for name in names}
     q = np.concatenate([one.q for one in given], axis=1).astype(np.float64)
     return Points(q, {name: value.astype(np.float64) for name, value in parameters.items()})
 
@@ -107,7 +108,7 @@ def judge(module: Any, energy: Energy, element: Element) -> Judgement:
     Parameters
     ----------
     module
-        A kernel, with ``VARIANT``, ``energy`` and ``evaluate``.
+        A kernel, with ``VARIANT``, ``KERNEL``, ``energy`` and ``evaluate``.
     energy
         Its declaration.
     element
@@ -118,18 +119,20 @@ def judge(module: Any, energy: Energy, element: Element) -> Judgement:
     fits = [_fits(array, element.q.dtype) for array in (true.energy, true.gradient, true.hessian)]
     flaws: list[Flaw] = []
     worst = 0.0
-    calls: list[tuple[Any, str, bool]] = [
-        (module.energy, "E", bool(true.has_energy[0]) and fits[0]),
-        (module.evaluate, "EGH", bool(true.has_derivatives[0]) and all(fits)),
+    calls: list[tuple[Any, str, bool, bool]] = [
+        (module.energy, "E", bool(true.has_energy[0]), fits[0]),
+        (module.evaluate, "EGH", bool(true.has_derivatives[0]), all(fits)),
     ]
-    for function, outputs, has_value in calls:
-        found, flaw = _call(function, element, has_value)
-        if flaw is not None:
+    for function, outputs, has_value, fit in calls:
+        found, flaw = _call(function, element, has_value and fit)
+        if flaw is not None and (
+            flaw.kind != "accepted" or not has_value
+        ):  # an infinity may stand for what does not fit
             flaws.append(flaw)
-        if found is None or not has_value:
+        if found is None or not (has_value and fit):
             continue
         for output, computed in zip(outputs, found, strict=True):
-            wrong, size = _compare(module.VARIANT, energy, points, true, output, computed)
+            wrong, size = _compare(limit_of(module), energy, points, true, output, computed)
             flaws += wrong
             worst = max(worst, size)
     return Judgement(tuple(dict.fromkeys(flaws)), worst)
@@ -157,10 +160,9 @@ def _call(function: Any, element: Element, has_value: bool) -> tuple[list[Array]
 
 
 def _compare(
-    variant: str, energy: Energy, points: Points, true: Truth, output: str, computed: Array
+    limit: Limit, energy: Energy, points: Points, true: Truth, output: str, computed: Array
 ) -> tuple[list[Flaw], float]:
     """Flaws of one output, and its largest error as a multiple of its limit."""
-    limit = limit_of(variant)
     errors: Errors = measure(output, computed, true, energy.unknowns, str(computed.dtype))
     sizes = errors.normwise[:, 0]
     worst = float(np.nanmax(sizes, initial=0.0)) / limit.rounding

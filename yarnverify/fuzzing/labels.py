@@ -33,6 +33,8 @@ def _of_points(dofs: tuple[str, ...], element: Element) -> list[str]:
         return []
     points = element.q[rows, 0].astype(float).reshape(-1, 3)
     edges = points[1:] - points[0]
+    if not len(edges):
+        return []
     lengths = np.abs(edges).max(axis=1)
     if not lengths.all():
         return ["a segment of length zero"]

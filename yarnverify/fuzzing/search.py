@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 import signal
 import threading
@@ -12,12 +11,14 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from hypothesis import HealthCheck, Phase, Verbosity, given, seed, settings, target
 
+from yarnverify.accuracy.cells import kernel
 from yarnverify.errors import InputError
-from yarnverify.fuzzing.judge import Flaw, Judgement, declared, judge
+from yarnverify.fuzzing.judge import Flaw, Judgement, Limit, declared, judge, limit_of
 from yarnverify.fuzzing.labels import labels
 from yarnverify.kernels import VARIANTS
 from yarnverify.strategies import Element, elements
@@ -49,6 +50,8 @@ class Search:
     ----------
     energy, variant, seed
         What was searched, and the seed that draws the same elements again.
+    limit, promise
+        What errors were held to, and whether the kernel promises that: ``none`` if not.
     cases, regimes
         Number of elements, and of those in each regime; an element may be in several.
     worst, worst_element
@@ -62,6 +65,8 @@ class Search:
     energy: str
     variant: str
     seed: int
+    limit: Limit
+    promise: str
     cases: int
     regimes: dict[str, int]
     worst: float
@@ -145,6 +150,7 @@ def search(
     seed_: int,
     advance: Callable[[str, int], None] = lambda label, total: None,
     most: float = math.inf,
+    folder: Path | None = None,
 ) -> Search:
     """Look for elements at which a kernel breaks its promises.
 
@@ -160,13 +166,15 @@ def search(
         Told after each element.
     most
         Largest number of elements.
+    folder
+        Of your own derivations, with the kernels that were generated for them.
 
     Raises
     ------
     InputError
-        For a name that is no energy or no variant.
+        For a name that is no energy or no variant, or has no kernel.
     """
-    declaration, module = declared(energy), _kernel(energy, variant)
+    declaration, module = declared(energy, folder), _kernel(energy, variant, folder)
     progress = _Progress(module, declaration, time.monotonic() + seconds, most, advance)
     interrupted = False
     try:
@@ -181,6 +189,8 @@ def search(
         energy,
         variant,
         seed_,
+        limit_of(module),
+        module.KERNEL.promise,
         progress.cases,
         dict(progress.regimes.most_common()),
         progress.worst,
@@ -209,10 +219,10 @@ def _alarm(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def _kernel(energy: str, variant: str) -> Any:
+def _kernel(energy: str, variant: str, folder: Path | None = None) -> Any:
     if variant not in VARIANTS:
         raise InputError(f"there is no variant {variant!r}; one of {', '.join(VARIANTS)}")
-    return importlib.import_module(f"yarnverify.kernels.{variant}.{energy}")
+    return kernel(variant, energy, folder or "")
 
 
 def _round(progress: _Progress, number: int) -> None:
@@ -231,7 +241,7 @@ def _round(progress: _Progress, number: int) -> None:
         report_multiple_bugs=False,
         verbosity=Verbosity.quiet,
     )
-    @given(elements(progress.module))
+    @given(elements(progress.module, units={p.label: p.unit for p in progress.energy.parameters}))
     def law(element: Element) -> None:
         nonlocal tried
         judgement = progress.judge(element)

@@ -52,7 +52,7 @@ class Arrays:
 
     def again(self) -> bool:
         batch = self._batch
-        if batch.n > FEW or batch.kernel.numbers != "float":
+        if batch.n > FEW or batch.kernel.numbers == "double-double":
             return False
         inputs, calls, margins, choice = self._whole
         with np.errstate(all="ignore"):

@@ -169,7 +169,7 @@ class Batch:
         None where that does not serve: of other numbers, and where arrays would hold infinity or NaN.
         """
         kernel = self.kernel
-        if not kernel.portable or kernel.numbers != "float" or self.dtype != np.float64:
+        if not kernel.portable or kernel.numbers == "double-double" or self.dtype != np.float64:
             return None
         values = [float(value if np.ndim(value) == 0 else value[element]) for value in self.values]
         try:
@@ -209,7 +209,7 @@ class Batch:
             done.result()
 
     def _worker(self) -> Worker:
-        if self.engine == "compiled" and self.kernel.numbers == "float":
+        if self.engine == "compiled" and self.kernel.numbers != "double-double":
             from yarnverify.kernels.compiled import Loops
 
             return Loops(self)

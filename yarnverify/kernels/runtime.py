@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from yarnverify.kernels.batch import CHUNK, Batch, upper
 from yarnverify.kernels.inputs import Array, ElementError, Engine, Errors, Out, Values
 from yarnverify.kernels.tape import Tape, record
+from yarnverify.kernels.words import Number, number
 
 __all__ = [
     "CHUNK", "Array", "ArrayLike", "ElementError", "Errors", "Kernel", "Options", "Out", "Shape", "Unpack", "unpack",
@@ -81,7 +82,8 @@ class Kernel:
     portable
         Whether only correctly rounded operations are used, so that bits are the same everywhere.
     numbers
-        ``float``, or ``double-double`` for arithmetic in pairs that is rounded once at the end.
+        ``float``; ``words`` for sums whose terms have more digits than they themselves need; or ``double-double`` for
+        arithmetic in pairs that is rounded once at the end.
     promise
         How large errors are, where the variant does not say it: a few ``units`` in the last place, no more than the
         ``condition`` of the state explains, or ``none`` for formulas that lose digits near singular states.
@@ -95,7 +97,7 @@ class Kernel:
     velocities: tuple[str, ...] = ()
     scaling: Literal["points", "lengths"] = "lengths"
     portable: bool = True
-    numbers: Literal["float", "double-double"] = "float"
+    numbers: Literal["float", "words", "double-double"] = "float"
     promise: Literal["units", "condition", "none"] = "units"
     loops: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # compiled ones, as they are made
     _tapes: dict[Any, Tape] = field(default_factory=dict, compare=False, repr=False)
@@ -111,9 +113,11 @@ class Kernel:
         dof = len(self.dofs)
 
         def function(scalars: Sequence[Any]) -> list[Any]:
-            energy, gradient, hessian, margins, choice = self.shapes[shape].function(scalars[:dof], scalars[dof:])
+            given = [number(value) for value in scalars] if self.numbers == "words" else scalars
+            energy, gradient, hessian, margins, choice = self.shapes[shape].function(given[:dof], given[dof:])
             parts = {"E": (energy,), "G": gradient, "H": hessian}
-            return [value for key in wanted for value in parts[key]] + [*margins, *choice]
+            found = [value for key in wanted for value in parts[key]] + [*margins, *choice]
+            return [value.rounded if isinstance(value, Number) else value for value in found]
 
         return function
 

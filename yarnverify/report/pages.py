@@ -32,7 +32,7 @@ def pages(
     ----------
     records
         ``verdicts``, ``derivations`` and ``kernels``, as written to ``records/``;
-        ``accuracy``, ``benchmark``, ``analysis``, ``simulation`` and ``simulation-speed`` where measured.
+        ``accuracy``, ``benchmark``, ``analysis``, ``simulation``, ``simulation-speed`` and ``tutorial`` where run.
     pictures
         Names of the pictures that are in ``pictures/``.
     source
@@ -53,6 +53,7 @@ def pages(
             analysed=records.get("analysis") is not None,
             simulated=records.get("simulation") is not None,
             timed=records.get("simulation-speed") is not None,
+            taught=records.get("tutorial") is not None,
         )
     }
     for energy, derivation in derived.items():
@@ -104,7 +105,14 @@ def pages(
         )
     if "reference" in records:
         texts["reference.md"] = _render("reference.md.jinja", modules=records["reference"]["modules"])
+    if records.get("tutorial") is not None:
+        texts["tutorial.md"] = tutorial_page(records["tutorial"])
     return dict(sorted(texts.items()))
+
+
+def tutorial_page(record: dict[str, Any]) -> str:
+    """The tutorial with what its commands and examples printed."""
+    return _render("tutorial.md.jinja", parts=record["parts"])
 
 
 def _accuracy(record: dict[str, Any] | None, energy: str) -> list[str]:

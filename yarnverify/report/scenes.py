@@ -36,8 +36,8 @@ class Shown:
 
 
 def scenes(record: Mapping[str, Any] | None, gallery: Sequence[Mapping[str, Any]] = ()) -> list[Shown]:
-    """The scenes of a record, in its order, then those results of a gallery that it lacks."""
-    recorded = [] if record is None else record["scenes"]
+    """The scenes of a record, in its order, those to be looked at last, then those results of a gallery that it lacks."""
+    recorded = [] if record is None else [*record["scenes"], *record.get("shown", ())]
     known = {each["result"]["scene"] for each in recorded}
     found = [_shown(each["result"], each.get("timings")) for each in recorded]
     return [*found, *(_shown(result, None) for result in gallery if result["scene"] not in known)]

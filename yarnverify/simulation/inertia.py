@@ -1,4 +1,8 @@
-"""Kinetic energy of a system: momenta, forces of inertia, and their derivatives, all from the kinetic kernel."""
+"""Kinetic energy of a system: momenta, forces of inertia, and their derivatives, all from the kinetic kernel.
+
+Scenes take the kernel's variant ``fast``: a step rounds its unknowns and their rates, and that variant loses no more than
+these roundings do to the result. What ``accurate`` keeps beyond, and takes several times as long for, no step could use.
+"""
 
 from __future__ import annotations
 

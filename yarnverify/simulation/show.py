@@ -12,7 +12,8 @@ def study_lines(result: Mapping[str, Any], timings: Mapping[str, Any]) -> Iterat
     for name, own in result["parameters"].items():
         value = f"{own['value']:.10g}" if isinstance(own["value"], float) else own["value"]
         reason = f"   {own['reason']}" if own["reason"] else ""
-        yield f"  {name} = {value} {own['unit']}".rstrip() + reason
+        unit = "" if own["unit"] == "1" else own["unit"]
+        yield f"  {name} = {value} {unit}".rstrip() + reason
     if result["wall"]:
         yield f"  The wall is {result['wall']}."
     if result["source"]:

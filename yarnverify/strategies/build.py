@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -29,13 +30,17 @@ class Element:
         return iter((self.q, dict(self.parameters)))
 
     def __repr__(self) -> str:
-        rows = " ".join(_hexadecimal(value) for value in self.q[:, 0])
-        given = "".join(f', {name}="{_hexadecimal(value)}"' for name, value in self.parameters.items())
+        rows = _texts(self.q[:, 0])
+        given = "".join(f', {name}="{_texts(value)}"' for name, value in self.parameters.items())
         kind = "" if self.q.dtype == np.float64 else f', dtype="{self.q.dtype}"'
         return f'element("{rows}"{given}{kind})'
 
     def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
         printer.text(repr(self))  # Hypothesis would print the arrays of a dataclass, rounded
+
+
+def _texts(values: Any) -> str:
+    return " ".join(_hexadecimal(value) for value in np.atleast_1d(values))
 
 
 def _hexadecimal(value: float) -> str:
@@ -55,7 +60,7 @@ def element(rows: str, *, dtype: str = "float64", **parameters: str) -> Element:
     dtype
         Of ``q``.
     parameters
-        Value of each parameter.
+        Value of each parameter; three of a vector.
 
     Raises
     ------
@@ -71,10 +76,11 @@ def element(rows: str, *, dtype: str = "float64", **parameters: str) -> Element:
     ([[0.0], [1.5]], {'d': 2.0})
     """
     values = [float.fromhex(text) for text in rows.split()]
-    return _element(values, {name: float.fromhex(text) for name, text in parameters.items()}, dtype)
+    given = {name: [float.fromhex(part) for part in text.split()] for name, text in parameters.items()}
+    return _element(values, {name: np.array(own) if len(own) > 1 else own[0] for name, own in given.items()}, dtype)
 
 
-def _element(rows: Any, parameters: dict[str, float], dtype: Any) -> Element:
+def _element(rows: Any, parameters: dict[str, Any], dtype: Any) -> Element:
     q = np.array(rows, dtype=dtype).reshape(-1, 1)
     q.flags.writeable = False
     return Element(q, parameters)
@@ -90,6 +96,7 @@ def elements(
     scale: SearchStrategy[float] | None = None,
     strain: SearchStrategy[float] | None = None,
     stiffness: SearchStrategy[float] | None = None,
+    units: Mapping[str, str] = MappingProxyType({}),
     dtype: Any = np.float64,
 ) -> SearchStrategy[Element]:
     """Elements of a kernel, made by the names of its rows.
@@ -103,11 +110,14 @@ def elements(
     Parameters
     ----------
     kernel
-        Name of an energy in ``yarnverify.kernels``, or any object with ``DOFS`` and ``PARAMETERS``.
+        Name of an energy in ``yarnverify.kernels``, or any object with ``DOFS`` and ``PARAMETERS``, such as a kernel of yours.
     turn, orientation, ratio, offset, scale, strain
         Strategies to draw from instead of ``turns()``, ``orientations()``, and so on; with float32, in its range.
     stiffness
-        Strategy for each parameter.
+        Strategy for each parameter; for a vector, of its length.
+    units
+        Units of parameters by name, where they are known: what is in m is drawn near the size of the element as often as not,
+        and what is in rad between -3 and 3.
     dtype
         float64 or float32.
 
@@ -127,6 +137,7 @@ def elements(
     """
     module = _module(kernel)
     points, sliding = _rows(module.DOFS)
+    vectors = module.KERNEL.vectors if hasattr(module, "KERNEL") else ()
     single = np.dtype(dtype) == np.float32
     turn = turns(smallest=1e-30 if single else 1e-300) if turn is None else turn
     orientation = orientations() if orientation is None else orientation
@@ -145,7 +156,16 @@ def elements(
         at: dict[str, float] = {}
         for point, position in zip(points, _positions(draw, len(points), turn, orientation, lengths), strict=True):
             at |= {f"{point}.{axis}": p + size * s for axis, p, s in zip("xyz", position, shift, strict=True)}
-        parameters = {name: draw(stiffness) for name in module.PARAMETERS}
+        parameters: dict[str, Any] = {}
+        for name in module.PARAMETERS:
+            if name in vectors:
+                parameters[name] = draw(stiffness) * draw(orientation)[:, 0]
+            elif units.get(name) == "rad":
+                parameters[name] = draw(st.floats(-3, 3, width=32 if single else 64))
+            elif units.get(name) == "m" and points and draw(st.booleans()):
+                parameters[name] = size * (1 + draw(strain))
+            else:
+                parameters[name] = draw(stiffness)
         if not points and "d" in parameters:
             parameters["d"] = size
         stretched = 1 + draw(strain) if sliding else 1.0

@@ -14,12 +14,18 @@ from sympy.printing.c import C99CodePrinter
 from yarnverify.errors import InputError
 from yarnverify.symbolic.c_functions import Functions, flat, rebuilt
 from yarnverify.symbolic.declare import Energy, load_declarations
-from yarnverify.symbolic.emit import dof_labels, given_symbols, identifier
+from yarnverify.symbolic.emit import dof_labels, given_symbols
 from yarnverify.symbolic.modules import length_power
 from yarnverify.symbolic.printing import LIBRARY, TEMPLATES, statements
 from yarnverify.symbolic.programs import derived_programs, proved
 from yarnverify.symbolic.reading import UnsupportedError
 from yarnverify.symbolic.steps import Program
+
+_WORDS_OF_C = {
+    "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern",
+    "float", "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed",
+    "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while",
+}  # fmt: skip
 
 
 class _Printer(C99CodePrinter):  # type: ignore[misc]
@@ -160,7 +166,7 @@ def c_texts(name: str, folder: Path) -> dict[str, str]:
     Raises
     ------
     InputError
-        Where there is no such energy.
+        Where there is no such energy, or C could not have its names.
     NotRunError
         Where a derived block is not proved.
     """
@@ -168,6 +174,11 @@ def c_texts(name: str, folder: Path) -> dict[str, str]:
     energy = next((energy for energy in declarations.energies if energy.name == name), None)
     if energy is None:
         raise InputError(f"{name}: no such energy; there are {', '.join(e.name for e in declarations.energies)}")
+    for word in (name, *(parameter.label for parameter in energy.parameters)):
+        if word in _WORDS_OF_C:
+            raise InputError(
+                f"{name}: {word!r} is a word of C, which can have no function or value of this name; rename it"
+            )
     programs, notes = derived_programs(energy, proved(energy, declarations), "accurate")
     return _texts(energy, programs, notes)
 
@@ -188,7 +199,7 @@ def _texts(energy: Energy, programs: list[Program], notes: list[str]) -> dict[st
         "notes": notes,
         "rows": labels,
         "dof": len(labels),
-        "parameters": [(identifier(p.name), p.unit) for p in energy.parameters],
+        "parameters": [(str(symbol), p.unit) for p in energy.parameters for symbol in given_symbols(p.name)],
         "powers": [power for _, power in symbols],
         "functions": functions.used_in(code),
         "shapes": shapes,

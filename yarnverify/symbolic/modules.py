@@ -15,7 +15,15 @@ from yarnverify.symbolic.declare import Energy, load_declarations
 from yarnverify.symbolic.dimensions import dimension_of_unit
 from yarnverify.symbolic.emit import dof_labels, given_symbols, identifier
 from yarnverify.symbolic.printing import LIBRARY, TEMPLATES, statements, text_of, used_functions
-from yarnverify.symbolic.programs import Proved, derived_programs, library_calls, printed_program, promise, proved
+from yarnverify.symbolic.programs import (
+    Proved,
+    derived_programs,
+    library_calls,
+    numbers,
+    printed_program,
+    promise,
+    proved,
+)
 from yarnverify.symbolic.prove import read_with
 from yarnverify.symbolic.steps import Program
 
@@ -150,7 +158,7 @@ def module_text(
     """The text of one kernel module, and its operation counts."""
     dofs = dof_labels(energy.unknowns)
     names = [identifier(parameter.name) for parameter in energy.parameters]
-    functions = [_function(made, len(dofs)) for made in programs]
+    functions = [_function(made, len(dofs), numbers(variant, found) != "float") for made in programs]
     code = "\n".join(line for f in functions for line in (*f["lines"], *f["returned"]))
     tape = used_functions(code, "tape")
     full, upper = f"({len(dofs)}, {len(dofs)}, n)", f"({len(dofs) * (len(dofs) + 1) // 2}, n)"
@@ -186,7 +194,7 @@ def module_text(
         "scaling": "points" if angles_alone else "lengths",
         "portable": not LIBRARY & set(tape),
         "promise": promise(variant, found, bool(LIBRARY & set(tape))),
-        "numbers": "double-double" if variant == "reference" else "float",
+        "numbers": numbers(variant, found),
         "public": (
             ("energy", "(n,)", "Energy of each element", energy.unit, "Array"),
             ("gradient", vector, "Gradient, the negative of the force", f"{energy.unit}/m", "Array"),
@@ -247,14 +255,14 @@ def _tuple(names: Iterable[str]) -> str:
     return f"({inner[0]},)" if len(inner) == 1 else f"({', '.join(inner)})"
 
 
-def _function(made: Program, rows: int) -> dict[str, Any]:
+def _function(made: Program, rows: int, divides: bool) -> dict[str, Any]:
     """Name, body and returned values of one private function of a module."""
     choice = [] if made.choice is None else [made.choice]
     groups = (made.gradient, made.hessian, [check[0] for check in made.checks], choice)
-    returned = [text_of(made.energy) + ","]
+    returned = [text_of(made.energy, divides) + ","]
     for group in groups:
-        returned += _wrapped([text_of(value) for value in group])
-    return {"name": made.name, "lines": statements(made), "returned": returned, "checks": made.checks}
+        returned += _wrapped([text_of(value, divides) for value in group])
+    return {"name": made.name, "lines": statements(made, divides), "returned": returned, "checks": made.checks}
 
 
 def _wrapped(values: list[str], width: int = 108) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Any
 import sympy as sp
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from sympy.printing.numpy import NumPyPrinter
+from sympy.printing.precedence import precedence
 
 from yarnverify.symbolic.reading import UnsupportedError
 from yarnverify.symbolic.steps import Program, needed
@@ -24,6 +25,14 @@ TEMPLATES = Environment(
 
 class _Printer(NumPyPrinter):  # type: ignore[misc]
     """Scalar code whose every operation is one that ``kernels.tape`` records; integer powers are products."""
+
+    divides = False  # by 3 instead of multiplying by 1/3, which is not a double
+
+    def _print_Mul(self, expr: Any) -> str:
+        ratio, rest = expr.as_coeff_Mul()
+        if not self.divides or not ratio.is_Rational or not ratio.q & (ratio.q - 1):
+            return str(super()._print_Mul(expr))
+        return f"{self.parenthesize(ratio.p * rest, precedence(expr))}/{ratio.q}"
 
     def _print_Pow(self, expr: Any, rational: bool = False, sqrt: str = "sqrt") -> str:
         base, exponent = expr.args
@@ -58,7 +67,12 @@ class _Printer(NumPyPrinter):  # type: ignore[misc]
         return f"{expr.func.__name__}({', '.join(self._print(arg) for arg in expr.args)})"
 
 
+class _Divisions(_Printer):
+    divides = True
+
+
 _PRINTER = _Printer({"fully_qualified_modules": False})
+_DIVISIONS = _Divisions({"fully_qualified_modules": False})
 LIBRARY = {"arccos", "cos", "exp", "log", "sin", "tan"}  # not correctly rounded, so not the same on every machine
 _FUNCTIONS = {
     "tape": LIBRARY | {"power", "select", "sqrt"},
@@ -70,15 +84,16 @@ _FUNCTIONS = {
 }  # fmt: skip
 
 
-def text_of(value: Any) -> str:
-    return str(_PRINTER.doprint(value))
+def text_of(value: Any, divides: bool = False) -> str:
+    """The text of a value; ``divides`` where a third must be one to more digits than a double has."""
+    return str((_DIVISIONS if divides else _PRINTER).doprint(value))
 
 
-def statements(program: Program) -> list[str]:
+def statements(program: Program, divides: bool = False) -> list[str]:
     """The assignments of a program, each before it is used."""
     return [
         *program.prologue,
-        *(f"{symbol} = {text_of(value)}" for symbol, value in needed(program.steps, program.outputs).items()),
+        *(f"{symbol} = {text_of(value, divides)}" for symbol, value in needed(program.steps, program.outputs).items()),
     ]
 
 

@@ -25,9 +25,7 @@ from yarnverify.symbolic.steps import Program
 from yarnverify.symbolic.sums import Stages, is_rational
 from yarnverify.symbolic.tree import FORCE, Expr
 
-_PLAIN_SUMS = (
-    "no measures: each sum is formed once, in plain arithmetic, and loses only what the rounding of its terms explains"
-)
+_SUMS = "no measures: of the terms of each sum a word more is computed than of itself, since a word may cancel"
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ def proved(energy: Energy, declarations: Declarations) -> Proved:
 def derived_programs(energy: Energy, found: Proved, variant: str) -> tuple[list[Program], list[str]]:
     """The programs of a derived variant, and notes on what is not as wished."""
     if found.stages is not None and variant != "differentiated":
-        return [found.stages.program()], [_PLAIN_SUMS] if variant == "accurate" else []
+        return [found.stages.program()], [_SUMS] if variant == "accurate" else []
     if found.derivation is None:
         note = "this energy is no law of known measures: plain differentiation, nothing is done for its singular states"
         section = declared_section(energy)
@@ -185,8 +183,17 @@ def promise(variant: str, found: Proved, calls: bool) -> str:
         return "none"
     if variant == "reference":
         return "units"
+    if found.stages:
+        return "units" if variant == "accurate" and found.stages.exact_terms() else "condition"
     less = any(_compares_angles(shape) or shape.has_pole for shape in found.shapes)
     return "units" if variant == "accurate" and found.shapes and not less else "condition"
+
+
+def numbers(variant: str, found: Proved) -> str:
+    """What numbers a kernel computes with; see ``runtime.Kernel``."""
+    if variant == "reference":
+        return "double-double"
+    return "words" if variant == "accurate" and found.stages else "float"
 
 
 def _compares_angles(shape: Safe) -> bool:

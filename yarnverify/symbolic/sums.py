@@ -2,18 +2,22 @@
 
 What can lose digits is a sum of terms that cancel. Expanded derivatives regroup sums (``u0/6 - u1/6``) and lose what the
 declared form keeps (``(u1 - u0)/6``); here each declared sum is formed once from its own terms, and the chain rule over these
-steps never opens it. Where the energy is rational in its coordinates, ``prove`` shows that the result is its derivative, entry
-by entry, as rational functions.
+steps never opens it. What the chain rule itself adds and takes away again is another matter: where the energy is rational in
+its coordinates, an entry is also written in lowest terms, and the shorter of the two is taken. There ``prove`` shows that the
+result is the energy's derivative, entry by entry, as rational functions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
+from functools import cached_property, reduce
 from typing import Any
 
 import sympy as sp
 from sympy.polys.fields import FracField
 
+from yarnverify.kernels.words import CHEAP
 from yarnverify.symbolic.declare import Energy
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.emit import (
@@ -41,11 +45,25 @@ _STEPS = {"add", "norm", "sqrt", "call", "cross"}
 
 
 class _Sums(Components):
-    """A reading in which every sum and every function is a named step."""
+    """A reading in which every sum and every function is a named step.
+
+    Where the energy is rational, what is divided by stays outside of the steps: a sum is that of its terms over their common
+    denominator, and so one of products, which an exact kernel can form without an error.
+    """
+
+    def __init__(self, section: Section, rational: bool) -> None:
+        super().__init__(section, {})
+        self.rational = rational
 
     def value(self, expr: Expr, blocks: Callable[[Expr], Value] | None = None) -> Value:
         found = super().value(expr, blocks)
         return self._steps_of(found) if expr.op in _STEPS else found
+
+    def hold(self, value: Any) -> Any:
+        if not self.rational:
+            return super().hold(value)
+        over = sp.Mul.make_args(together(value))
+        return sp.Mul(*(super(_Sums, self).hold(factor) if factor.is_Add else factor for factor in over))
 
     def absolute(self, value: Any) -> Any:
         return super().absolute(self.hold(value))  # a symbol is known to be real, and so its sign to have no slope
@@ -54,18 +72,40 @@ class _Sums(Components):
         return [self._steps_of(part) for part in value] if isinstance(value, list) else self.hold(value)
 
 
+def together(value: Any) -> Any:
+    """A sum over the common denominator of its terms, their common factors outside; its terms are not opened."""
+    return sp.gcd_terms(value) if value.is_Add else value
+
+
 class Stages:
     """An energy as steps, with its derivatives by the rows of ``q`` over the same steps."""
 
     def __init__(self, energy: Energy, section: Section) -> None:
         self.energy = energy
         self.rows = [symbol for name in energy.unknowns for symbol in row_symbols(name)]
-        self.reading = _Sums(section, {})
+        self.parameters = [symbol for p in energy.parameters for symbol in given_symbols(p.name)]
+        self.rational = is_rational(energy, section)
+        self.reading = _Sums(section, self.rational)
         self.value = self.reading.value(energy.expression)
         self._slopes: dict[tuple[Any, sp.Symbol], Any] = {}
         self.gradient = [self.slope(self.value, row) for row in self.rows]
         count = len(self.rows)
         self.hessian = [self.slope(self.gradient[i], self.rows[j]) for i in range(count) for j in range(i, count)]
+        if self.rational:
+            opened = Exact(self, self._differences())
+            self.gradient, self.hessian = (
+                [shorter(value, opened.expression(value)) for value in values]
+                for values in (self.gradient, self.hessian)
+            )
+
+    def _differences(self) -> list[sp.Symbol]:
+        """The steps that are sums of coordinates and parameters themselves, such as the components of an edge."""
+        given = {*self.rows, *self.parameters}
+        return [
+            symbol
+            for symbol, value in self.steps.items()
+            if value.is_Add and all(part.as_coeff_Mul()[1] in given for part in value.args)
+        ]
 
     @property
     def steps(self) -> dict[sp.Symbol, Any]:
@@ -81,7 +121,8 @@ class Stages:
                 inner = self.slope(self.steps[symbol], row)
                 if inner != 0:
                     terms.append(differentiate(value, symbol) * inner)
-            self._slopes[key] = sp.Add(*terms)
+            found = sp.Add(*terms)
+            self._slopes[key] = together(found) if self.rational else found
         return self._slopes[key]
 
     def program(self) -> Program:
@@ -91,6 +132,26 @@ class Stages:
         checks += domain_checks(self.energy, self.reading)
         choice = active(self.energy, self.reading)
         return settled(self.steps, self.value, self.gradient, self.hessian, checks, choice)
+
+    def exact_terms(self) -> bool:
+        """Whether ``kernels.words`` has the terms of every sum without an error, so that no cancellation can cost digits."""
+        differences = set(self._differences())
+        inputs = {*self.rows, *self.parameters}
+
+        def words(value: Any) -> float:
+            if value in differences:
+                return 2
+            if value in inputs or value.is_Integer:
+                return 1
+            if value.is_Pow and value.exp.is_Integer and value.exp > 0:
+                return words(sp.Mul(*[value.base] * int(value.exp), evaluate=False))
+            if not value.is_Mul:
+                return math.inf
+            return reduce(lambda a, b: 2 * a * b, [words(factor) for factor in value.args if abs(factor) != 1])
+
+        every = [*self.steps.values(), self.value, *self.gradient, *self.hessian]
+        terms = {term for value in every for each in sp.sympify(value).atoms(sp.Add) for term in each.args}
+        return all(term.as_coeff_Mul()[1] in self.steps or words(term) <= CHEAP for term in terms)
 
     # -- proofs
 
@@ -110,20 +171,56 @@ class Stages:
         return wrong
 
 
-class Exact:
-    """Expressions of stages as rational functions of the rows and parameters, in lowest terms."""
+def shorter(*equal: Any) -> Any:
+    """That of equal expressions with the fewest operations, in which least is left that cancels whatever the state."""
+    return min(equal, key=lambda each: int(sp.count_ops(each)))
 
-    def __init__(self, stages: Stages) -> None:
-        parameters = [symbol for p in stages.energy.parameters for symbol in given_symbols(p.name)]
-        symbols = [*stages.rows, *parameters]
-        self.field = FracField([str(symbol) for symbol in symbols], sp.QQ)
-        self._known = dict(zip(symbols, self.field.gens, strict=True))
+
+class Exact:
+    """Expressions of stages as rational functions of the rows, the parameters and some steps, in lowest terms."""
+
+    def __init__(self, stages: Stages, kept: Sequence[sp.Symbol] = ()) -> None:
+        self._stages, self._symbols = stages, [*stages.rows, *stages.parameters, *kept]
+        self.field = FracField([str(symbol) for symbol in self._symbols], sp.QQ)
+        self._known = dict(zip(self._symbols, self.field.gens, strict=True))
         self.rows = list(self.field.gens[: len(stages.rows)])
         for symbol, meaning in stages.steps.items():
-            self._known[symbol] = self(meaning)
-        # the energy itself is read apart from the steps, so that an error in these shows
-        plain = Components(stages.reading.section, {}, naming=False)
-        self.energy = self(plain.value(stages.energy.expression))
+            if symbol not in self._known:
+                self._known[symbol] = self(meaning)
+
+    @cached_property
+    def energy(self) -> Any:
+        """The energy itself; read apart from the steps, so that an error in these shows."""
+        plain = Components(self._stages.reading.section, {}, naming=False)
+        return self(plain.value(self._stages.energy.expression))
+
+    def expression(self, value: Any) -> Any:
+        """A quotient of polynomials, in factors."""
+        found = self(value)
+        return self._factored(found.numer, self._collected) / self._factored(found.denom, self._plain)
+
+    def _plain(self, polynomial: Any) -> Any:
+        return polynomial.as_expr(*self._symbols)
+
+    def _factored(self, polynomial: Any, read: Callable[[Any], Any]) -> Any:
+        factor, parts = polynomial.factor_list()
+        over = [read(part) ** power for part, power in parts]
+        return sp.Mul(sp.Rational(factor.numerator, factor.denominator), *over)
+
+    def _collected(self, polynomial: Any) -> Any:
+        """A polynomial by the powers of one of its variables, with factored coefficients, or plainly: what is shortest."""
+        ways = [self._plain(polynomial)]
+        for at, symbol in enumerate(self._symbols):
+            powers: dict[int, dict[tuple[int, ...], Any]] = {}
+            for monomial, coefficient in polynomial.terms():
+                rest = (*monomial[:at], 0, *monomial[at + 1 :])
+                powers.setdefault(monomial[at], {})[rest] = coefficient
+            if 1 < len(powers) < len(polynomial):
+                parts = {power: polynomial.ring.from_dict(part) for power, part in powers.items()}
+                ways.append(
+                    sp.Add(*(self._factored(part, self._plain) * symbol**power for power, part in parts.items()))
+                )
+        return shorter(*ways)
 
     def __call__(self, value: Any) -> Any:
         if value in self._known:

@@ -12,27 +12,23 @@ from typing import Any
 import casadi
 import numpy as np
 
-from yarnverify.benchmark.peers.walk import FORMS, Functions, energy_of
-from yarnverify.benchmark.ways import Array, Outputs, Way, degrees_of_freedom, kept_outputs, outputs_bytes, sizes
+from yarnverify.benchmark.peers.walk import FORMS, energy_of, functions_of
+from yarnverify.benchmark.ways import (
+    Array,
+    Outputs,
+    Way,
+    count_of_parameters,
+    degrees_of_freedom,
+    kept_outputs,
+    outputs_bytes,
+    sizes,
+)
 from yarnverify.errors import NotRunError
 from yarnverify.symbolic.declare import Energy
 
 PACKAGES = ("casadi",)
 FLAGS = ("-O3", "-march=native", "-fno-math-errno")
-_FUNCTIONS = Functions(
-    float,
-    np.pi,
-    casadi.sqrt,
-    casadi.fabs,
-    {
-        "arccos": casadi.acos,
-        "arcsin": casadi.asin,
-        "arctan": casadi.atan,
-        "sin": casadi.sin,
-        "cos": casadi.cos,
-        "tan": casadi.tan,
-    },
-)
+_FUNCTIONS = functions_of(casadi, float, short=True)
 _LOOP = """
 void loop(long n, const double* q, const double* p, double* e, double* g, double* h) {{
   casadi_int iw[{iw}];
@@ -79,8 +75,8 @@ def _way(energy: Energy, compiler: str, form: str) -> Way:
 
 
 def _function(energy: Energy, dof: int, form: str) -> Any:
-    q, p = casadi.SX.sym("q", dof), casadi.SX.sym("p", len(energy.parameters))
-    parameters = [p[i] for i in range(len(energy.parameters))]
+    q, p = casadi.SX.sym("q", dof), casadi.SX.sym("p", count_of_parameters(energy))
+    parameters = [p[i] for i in range(count_of_parameters(energy))]
     value = energy_of(energy, [q[i] for i in range(dof)], parameters, _FUNCTIONS, form)
     hessian, gradient = casadi.hessian(value, q)
     upper = casadi.vertcat(*(hessian[i, j] for i in range(dof) for j in range(i, dof)))

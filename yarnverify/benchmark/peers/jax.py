@@ -16,27 +16,23 @@ os.environ.setdefault("JAX_PLATFORMS", "cpu")
 import jax
 import jax.numpy as jnp
 
-from yarnverify.benchmark.peers.walk import FORMS, Functions, energy_of
-from yarnverify.benchmark.ways import Array, Outputs, Way, chunks, degrees_of_freedom, kept_outputs, outputs_bytes
+from yarnverify.benchmark.peers.walk import FORMS, Functions, energy_of, functions_of
+from yarnverify.benchmark.ways import (
+    Array,
+    Outputs,
+    Way,
+    chunks,
+    count_of_parameters,
+    degrees_of_freedom,
+    kept_outputs,
+    outputs_bytes,
+)
 from yarnverify.symbolic.declare import Energy
 
 PACKAGES = ("jax", "jaxlib")
 AS_WRITTEN = "jit(vmap(hessian)), divided once, whole batch"  # what its documentation shows
 CHUNK = 4096
-_FUNCTIONS = Functions(
-    float,
-    np.pi,
-    jnp.sqrt,
-    jnp.abs,
-    {
-        "arccos": jnp.arccos,
-        "arcsin": jnp.arcsin,
-        "arctan": jnp.arctan,
-        "sin": jnp.sin,
-        "cos": jnp.cos,
-        "tan": jnp.tan,
-    },
-)
+_FUNCTIONS = functions_of(jnp, float, short=False)
 _ARRAYS = replace(_FUNCTIONS, arrays=jnp)
 _HESSIANS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("hessian", jax.hessian),
@@ -48,7 +44,7 @@ _HESSIANS: tuple[tuple[str, Callable[..., Any]], ...] = (
 def ways(energy: Energy) -> tuple[Way, ...]:
     """Three orders of differentiation, each on the whole batch and in chunks; and the energy as it is declared."""
     jax.config.update("jax_enable_x64", True)  # this process computes in double precision from here on
-    dof, parameters = degrees_of_freedom(energy), len(energy.parameters)
+    dof, parameters = degrees_of_freedom(energy), count_of_parameters(energy)
 
     def value(functions: Functions, form: str) -> Callable[[Any, Any], Any]:
         return lambda q, values: energy_of(energy, q, values, functions, form)

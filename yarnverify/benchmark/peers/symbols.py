@@ -6,17 +6,11 @@ from typing import Any
 
 import sympy as sp
 
-from yarnverify.benchmark.peers.walk import Functions, energy_of
-from yarnverify.benchmark.ways import degrees_of_freedom
+from yarnverify.benchmark.peers.walk import energy_of, functions_of
+from yarnverify.benchmark.ways import count_of_parameters, degrees_of_freedom
 from yarnverify.symbolic.declare import Energy
 
-_FUNCTIONS = Functions(
-    sp.Integer,
-    sp.pi,
-    sp.sqrt,
-    sp.Abs,
-    {"arccos": sp.acos, "arcsin": sp.asin, "arctan": sp.atan, "sin": sp.sin, "cos": sp.cos, "tan": sp.tan},
-)
+_FUNCTIONS = functions_of(sp, sp.Integer, short=True, pi=sp.pi)
 
 
 def expressions(energy: Energy, form: str) -> tuple[list[Any], list[Any], list[Any]]:
@@ -32,7 +26,7 @@ def energy_expression(energy: Energy, form: str) -> tuple[list[Any], list[Any], 
     """The same of the energy alone."""
     dof = degrees_of_freedom(energy)
     rows = list(sp.symbols(f"q:{dof}", real=True))
-    parameters = list(sp.symbols(f"p:{len(energy.parameters)}", real=True))
+    parameters = list(sp.symbols(f"p:{count_of_parameters(energy)}", real=True))
     return rows, parameters, energy_of(energy, rows, parameters, _FUNCTIONS, form)
 
 

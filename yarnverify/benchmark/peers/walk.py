@@ -49,6 +49,15 @@ class Functions:
 FORMS = ("as declared", "divided once")
 
 
+def functions_of(library: Any, number: Callable[[int], Scalar], *, short: bool, pi: Scalar = np.pi) -> Functions:
+    """What a library calls the functions, which are named as NumPy names them, or ``short``, as C does."""
+    names = {name: name for name in ("sin", "cos", "tan", "log", "exp")}
+    inverse = {"arccos": "acos", "arcsin": "asin", "arctan": "atan", "atan2": "atan2"}
+    names |= inverse if short else {name: name for name in inverse} | {"atan2": "arctan2"}
+    size = next(getattr(library, name) for name in ("fabs", "Abs", "abs") if hasattr(library, name))
+    return Functions(number, pi, library.sqrt, size, {name: getattr(library, own) for name, own in names.items()})
+
+
 def energy_of(
     energy: Energy,
     rows: Sequence[Scalar],
@@ -65,7 +74,7 @@ def energy_of(
     rows
         The degrees of freedom, three for a point and one for a sliding coordinate, in the declared order.
     parameters
-        In the declared order.
+        In the declared order, three for a vector.
     functions
         Of the library that the scalars belong to.
     form
@@ -81,17 +90,18 @@ def energy_of(
     values = values_of(energy, rows, parameters)
     if functions.arrays is not None:
         stack = functions.arrays.stack
-        values |= {n: stack([row[0] for row in values[n]])[:, None] for n in energy.unknowns if n.bold}
+        values |= {n: stack([row[0] for row in value])[:, None] for n, value in values.items() if n.bold}
     return _Walk(values, functions, form).value(energy.expression)
 
 
 def values_of(energy: Energy, rows: Sequence[Scalar], parameters: Sequence[Scalar]) -> dict[Name, Any]:
     """What each symbol of an energy stands for: a scalar, or a matrix of one column."""
-    values: dict[Name, Any] = {p.name: value for p, value in zip(energy.parameters, parameters, strict=True)}
-    at = 0
-    for name in energy.unknowns:
-        values[name] = [[rows[at + axis]] for axis in range(3)] if name.bold else rows[at]
-        at += 3 if name.bold else 1
+    values: dict[Name, Any] = {}
+    for names, given in ((energy.unknowns, rows), ([p.name for p in energy.parameters], parameters)):
+        at = 0
+        for name in names:
+            values[name] = [[given[at + axis]] for axis in range(3)] if name.bold else given[at]
+            at += 3 if name.bold else 1
     return values
 
 
@@ -201,7 +211,7 @@ class _Walk:
                 turned = [(1, 2), (2, 0), (0, 1)]
                 return [[a[i] * b[j] - a[j] * b[i]] for i, j in turned]
             case "call" if expr.value in functions.named:
-                return functions.named[str(expr.value)](first)
+                return functions.named[str(expr.value)](*args)
         raise NotRunError(f"{expr.value or expr.op} is unknown to this peer")
 
 

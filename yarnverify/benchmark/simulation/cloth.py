@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.kernels import bending, gravity, kinetic, shear, stretch
+from yarnverify.kernels import bending, gravity, shear, stretch
+from yarnverify.kernels.fast import kinetic
 from yarnverify.simulation.dynamics import Dynamics, Motion
 from yarnverify.simulation.fabric import Fabric, bends, segments, shears, weave
 from yarnverify.simulation.linear import ConjugateGradients, Factor, Multifrontal, Solver, lines_of

@@ -39,7 +39,7 @@ def _element(q: Any, p: Any) -> Any:
     t6 = 2*k*t4
     t7 = n_x*t6
     return (
-        (1/3)*k*(t4*t4*t4),
+        (k*(t4*t4*t4))/3,
         (
             -n_x*t5, -n_y*t5, -n_z*t5,
         ),

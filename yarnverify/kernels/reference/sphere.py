@@ -61,7 +61,7 @@ def _smooth(q: Any, p: Any) -> Any:
     P_0_zz = 1 - t8
     h_x0_x0_zz = P_0_zz*t3 + ddV_0_0*t8
     return (
-        (1/3)*k*(t1*t1*t1),
+        (k*(t1*t1*t1))/3,
         (
             g_x0_x, g_x0_y, g_x0_z,
         ),

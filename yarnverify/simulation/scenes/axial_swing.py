@@ -7,7 +7,8 @@ The energy of the midpoint rule is kept to 1e-12, or to what rounding leaves of 
 import numpy as np
 
 from yarnverify.errors import InputError
-from yarnverify.kernels import kinetic, stretch
+from yarnverify.kernels import stretch
+from yarnverify.kernels.fast import kinetic
 from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.dynamics import ORDERS, Scheme
 from yarnverify.simulation.fabric import segments, yarn

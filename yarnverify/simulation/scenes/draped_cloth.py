@@ -7,7 +7,8 @@ Crossings rest on the sphere; where folds of the cloth meet they pass through ea
 import numpy as np
 
 from yarnverify.errors import InputError
-from yarnverify.kernels import bending, gravity, kinetic, shear, sphere, stretch
+from yarnverify.kernels import bending, gravity, shear, sphere, stretch
+from yarnverify.kernels.fast import kinetic
 from yarnverify.simulation import scrim
 from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.dynamics import Scheme

@@ -7,7 +7,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from yarnverify.errors import InputError
-from yarnverify.kernels import bending, gravity, kinetic, shear, stretch
+from yarnverify.kernels import bending, gravity, shear, stretch
+from yarnverify.kernels.fast import kinetic
 from yarnverify.simulation import scrim
 from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.dynamics import Scheme

@@ -3,7 +3,8 @@
 import numpy as np
 
 from yarnverify.errors import InputError
-from yarnverify.kernels import bending, kinetic, shear, stretch
+from yarnverify.kernels import bending, shear, stretch
+from yarnverify.kernels.fast import kinetic
 from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.dynamics import Scheme
 from yarnverify.simulation.fabric import bends, segments, shears, weave

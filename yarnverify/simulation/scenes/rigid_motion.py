@@ -4,7 +4,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from yarnverify.errors import InputError
-from yarnverify.kernels import bending, kinetic, parallel_contact, shear, stretch
+from yarnverify.kernels import bending, parallel_contact, shear, stretch
+from yarnverify.kernels.fast import kinetic
 from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.dynamics import Scheme
 from yarnverify.simulation.fabric import bends, contacts, segments, shears, weave

@@ -10,7 +10,8 @@ are found.
 import numpy as np
 
 from yarnverify.errors import InputError
-from yarnverify.kernels import bending, kinetic, stretch
+from yarnverify.kernels import bending, stretch
+from yarnverify.kernels.fast import kinetic
 from yarnverify.simulation.answers import frequency
 from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.fabric import bends, segments, yarn

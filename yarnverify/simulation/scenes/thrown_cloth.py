@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from yarnverify.kernels import bending, gravity, kinetic, shear, stretch
+from yarnverify.kernels import bending, gravity, shear, stretch
+from yarnverify.kernels.fast import kinetic
 from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.dynamics import ORDERS, Dynamics, Scheme
 from yarnverify.simulation.fabric import bends, segments, shears, weave
