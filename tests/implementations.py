@@ -407,6 +407,11 @@ def stretch_odd(q: Any, k_s: float) -> Any:
     return np.zeros(7)
 
 
+def stretch_piece(q: Any, k_s: float) -> Any:
+    """Of one state alone: the products of points fail for arrays of them."""
+    return (q[3:6] @ np.ones(3)) * np.ones(3)
+
+
 def stretch_stranger(q: Any, youngs: float) -> Any:
     return np.zeros(8)
 

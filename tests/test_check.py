@@ -310,6 +310,12 @@ def test_nothing_came_back() -> None:
             "results of 7 numbers for a state of 8: say what they are with --returns",
         ),
         (
+            f"{ZOO}:stretch_piece",
+            {},
+            InputError,
+            "^[^;]* with --returns, such as --returns F_x1 for the force on x1, x1 for the gradient$",
+        ),
+        (
             f"{ZOO}:stretch_stranger",
             {},
             InputError,

@@ -62,7 +62,7 @@ def test_a_scene_without_an_answer_says_why_whatever_the_time(monkeypatch: pytes
 
 
 def test_an_answer_that_is_one_with_everything_too_is_found_from_itself() -> None:
-    found, _ = frugality(find("hanging_yarn").problem(4), 4)
+    found, _ = frugality(find("hanging_yarn").problem(5), 5)
     other = found["all energies, all sliding"]  # from the start nodes slide along the yarn until two meet
     assert other["trouble"] and other["falling"] == 0
     assert max(move["by"] for move in other["moved"]) < 1e-12

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 
 from yarnverify import cli, notebook
 from yarnverify.accuracy.cells import kernel
+from yarnverify.errors import NotRunError
 from yarnverify.generation import generate_kernels
 from yarnverify.init import init
 from yarnverify.project import project
@@ -84,6 +86,14 @@ def test_three_cells_reach_a_picture(record: dict[str, Any], monkeypatch: pytest
     assert equation.verdict == "refuted" and 'class="was"' in equation._repr_html_()
     assert scene.png.startswith(b"\x89PNG") and scene._repr_png_() == scene.png
     assert "data:image/png;base64," in scene._repr_html_() and "Every error and every order as expected." in repr(scene)
+
+
+def test_without_anything_that_draws_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    monkeypatch.delitem(sys.modules, "yarnverify.simulation.view", raising=False)
+    with pytest.raises(NotRunError, match=r"needs matplotlib: pip install 'yarnverify\[view\]'"):
+        notebook.simulate("hanging_yarn", size=2)
 
 
 def test_verdicts_show_themselves(record: dict[str, Any]) -> None:

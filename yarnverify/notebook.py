@@ -21,7 +21,7 @@ from typing import Any
 
 from markupsafe import Markup, escape
 
-from yarnverify.errors import InputError
+from yarnverify.errors import InputError, NotRunError
 from yarnverify.report.mathml import compared, formula
 
 _COLOUR = {"proved": "#1a7f37", "refuted": "#cf222e", "undecided": "#9a6700", "inconsistent": "#8250df"}
@@ -235,5 +235,8 @@ def simulate(scene: str, size: int, **parameters: float | str) -> Simulated:
     given = [f"{name}={value}" for name, value in parameters.items()]
     with TemporaryDirectory() as folder:
         found, _ = run(scene, [size], given, None, Path(folder) / "run", False, 1e9, True, lambda *args: None)
-        png = (Path(folder) / "run" / f"{found.result['scene']}.png").read_bytes()
+        picture = Path(folder) / "run" / f"{found.result['scene']}.png"
+        if not picture.is_file():
+            raise NotRunError("the picture of a scene needs matplotlib: pip install 'yarnverify[view]'")
+        png = picture.read_bytes()
     return Simulated(found.result, found.timings, png)

@@ -63,6 +63,10 @@ class Task:
         draft.replace(self.folder / "decided.json")
 
 
+class _UnnamedError(ValueError):
+    """Results came back, of sizes that do not say what they are."""
+
+
 def run_python(task: Task) -> None:
     """Call a Python function."""
     target, q = task.task["target"], task.q
@@ -106,7 +110,14 @@ def run_python(task: Task) -> None:
         names_or_none = guessed(sizes, rows, name, task.task["pieces"])
         if names_or_none is None or len(set(names_or_none)) < len(names_or_none):
             shown = ", ".join(str(size) for _, size in sizes)
-            raise ValueError(f"results of {shown} numbers for a state of {rows}: say what they are with --returns")
+            points = [label for label, size in task.task["pieces"] if size == 3]
+            example = {"3": "F_{0} for the force on {0}, {0} for the gradient", "9": "dF_{0}/d{0} for a Jacobian"}.get(
+                shown
+            )
+            such = f", such as --returns {example.format(points[-1])}" if example and points else ""
+            raise _UnnamedError(
+                f"results of {shown} numbers for a state of {rows}: say what they are with --returns{such}"
+            )
         return names_or_none
 
     first = task.task["todo"][0][0]
@@ -145,6 +156,7 @@ def _layout(
 ) -> tuple[str, list[str], str]:  # fmt: skip
     """The first layout in which the function can be called and gives results of a size that means something."""
     why: dict[str, list[str]] = {}
+    unnamed: list[str] = []
     for layout in layouts:
         where = _tried(layout, first, len(task.q))
         task.begin(where)
@@ -152,12 +164,14 @@ def _layout(
             found, kind = parts(where, layout)
             return layout, fits(found), kind
         except Exception as error:
+            if isinstance(error, _UnnamedError):
+                unnamed.append(str(error))
             shape = {"single": "one state", "component": "(rows, states)", "element": "(states, rows)"}[layout]
             text = " ".join(str(error).split())[:200]
             why.setdefault(text if type(error) is ValueError else f"{type(error).__name__}: {text}", []).append(shape)
     size = task.q.shape[1]
-    if len(why) == 1:
-        raise InputError(f"{task.task['target']}: {next(iter(why))}")
+    if unnamed or len(why) == 1:  # where it can be called one way, why not otherwise is of no interest
+        raise InputError(f"{task.task['target']}: {(unnamed or list(why))[0]}")
     tried = "; ".join(f"with {' and '.join(shapes)}: {text}" for text, shapes in why.items())
     raise InputError(
         f"{task.task['target']}: cannot be called with states of {size} numbers (--order says others): {tried}"

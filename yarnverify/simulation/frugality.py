@@ -24,7 +24,7 @@ from yarnverify.simulation.outcome import UNSOLVED
 from yarnverify.simulation.runs import Run
 from yarnverify.simulation.setting import Known, Outcome, Setting, Static
 
-# what a scene does not say of its yarns is that of cotton: Y pi R^2 and EI with Y = 0.4 GPa and E = 0.8 GPa at R = 0.2 mm, a
+# what a scene does not say of its yarns is that of cotton: Y pi R^2 with Y = 0.4 GPa and R = 0.2 mm, fibres that bend freely, a
 # shear modulus 4 k_x/L of 40 N/m at L = 1 mm, a contact that gives by a tenth of R under 2 mN; no weight where there was none
 COTTON: dict[str, Any] = {"k_s": 50.0, "k_b": 1e-9, "k_x": 0.01, "k_c": 1e5, "rho": 1e-4, "g": (0.0, 0.0, 0.0)}
 ALL = ((stretch, segments), (bending, bends), (shear, shears), (parallel_contact, contacts), (gravity, segments))

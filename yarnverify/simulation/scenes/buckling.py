@@ -34,7 +34,9 @@ def buckling(
     size: int,
     load: float = positive(1.2, "", "over Euler's load; from 1 on the yarn buckles"),
     length: float = positive(0.05, "m"),
-    k_b: float = positive(1e-9, "N m^2", "EI of a solid cotton yarn, E = 0.8 GPa, R = 0.2 mm"),
+    k_b: float = positive(
+        1e-9, "N m^2", "fibres of cotton that slide freely, 6e-12 N m^2 each: a solid yarn has 500 times as much"
+    ),
     k_s: float = positive(0.5, "N", "soft against 50 N of cotton, so that rounding of coordinates makes less force"),
 ) -> Static:
     if size % 2:

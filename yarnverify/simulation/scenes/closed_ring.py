@@ -25,7 +25,9 @@ def closed_ring(
     size: int,
     length: float = positive(0.05, "m"),
     flat: float = positive(0.7, "", "height of the ellipse at the start, over that of the circle"),
-    k_b: float = positive(1e-9, "N m^2", "EI of a solid cotton yarn, E = 0.8 GPa, R = 0.2 mm"),
+    k_b: float = positive(
+        1e-9, "N m^2", "fibres of cotton that slide freely, 6e-12 N m^2 each: a solid yarn has 500 times as much"
+    ),
     k_s: float = positive(
         1e-3, "N", "any: nothing is stretched; soft, so that rounding of coordinates makes little force"
     ),

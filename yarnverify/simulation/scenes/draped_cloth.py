@@ -36,7 +36,7 @@ def draped_cloth(
     k_b: float = scrim.k_b,
     k_x: float = scrim.k_x,
     rho: float = scrim.rho,
-    k: float = positive(1e4, "N m^-2", "of the sphere: a depth of 0.1 mm carries 1e-4 N, the weight of 13 crossings"),
+    k: float = positive(1e4, "N/m^2", "of the sphere: a depth of 0.1 mm carries 1e-4 N, the weight of 13 crossings"),
     L: float = scrim.L,
     R: float = scrim.R,
     g: float = positive(9.81, "m/s^2", "gravity"),

@@ -29,7 +29,9 @@ def end_moment(
     turn: float = real(5.0, "rad", "M L/EI: four fifths of a circle"),
     length: float = positive(0.05, "m", "between the middles of the segments that are held"),
     push: float = real(0.05, "", "how far the arc is out of shape at the start, over its length"),
-    k_b: float = positive(1e-9, "N m^2", "EI of a solid cotton yarn, E = 0.8 GPa, R = 0.2 mm"),
+    k_b: float = positive(
+        1e-9, "N m^2", "fibres of cotton that slide freely, 6e-12 N m^2 each: a solid yarn has 500 times as much"
+    ),
     k_s: float = positive(
         1e-3, "N", "any: nothing is stretched; soft, so that rounding of coordinates makes little force"
     ),

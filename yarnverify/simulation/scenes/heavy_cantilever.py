@@ -21,9 +21,11 @@ from yarnverify.simulation.walls import clamped, tip_answers
 )
 def heavy_cantilever(
     size: int,
-    length: float = positive(0.03, "m"),
-    k_b: float = positive(1e-9, "N m^2", "EI of a solid cotton yarn, E = 0.8 GPa, R = 0.2 mm"),
-    k_s: float = positive(50.0, "N", "Y pi R^2 with Y = 0.4 GPa"),
+    length: float = positive(0.03, "m", "rho g L^3/EI = 13: the tip hangs down"),
+    k_b: float = positive(
+        1e-9, "N m^2", "fibres of cotton that slide freely, 6e-12 N m^2 each: a solid yarn has 500 times as much"
+    ),
+    k_s: float = positive(50.0, "N", "Y pi R^2 of a cotton yarn, Y = 0.4 GPa, R = 0.2 mm"),
     rho: float = positive(5e-5, "kg/m", "50 tex, a cotton yarn"),
     g: float = positive(9.81, "m/s^2", "gravity"),
     wall: str = choice("middle", "node"),

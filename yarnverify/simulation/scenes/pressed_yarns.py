@@ -23,7 +23,7 @@ from yarnverify.simulation.setting import Known, Stage, Static
 def pressed_yarns(
     size: int,
     force: float = positive(0.01, "N", "presses the last crossing towards the first"),
-    k_c: float = positive(1e5, "N/m^2", "overlaps by a quarter of R at this force"),
+    k_c: float = positive(1e5, "N/m^2", "overlaps by a quarter of 2R at this force"),
     L: float = positive(0.9e-3, "m", "a dense cloth"),
     R: float = positive(0.2e-3, "m", "a cotton yarn"),
 ) -> Static:

@@ -26,7 +26,7 @@ def still_cloth(
     k_s: float = positive(50.0, "N", "cotton yarn of 20 tex, 2.5 N/tex"),
     k_b: float = positive(1e-9, "N m^2", "the same, fibres partly free"),
     k_x: float = positive(5e-3, "N", "cloth with a shear stiffness of 20 N/m: 4 k_x/L"),
-    k_c: float = positive(1e4, "N m^-2", "contact at most a tenth of stretch: k_c L^2 is 1e-2 N"),
+    k_c: float = positive(1e4, "N/m^2", "contact at most a tenth of stretch: k_c L^2 is 1e-2 N"),
     rho: float = positive(2e-5, "kg/m", "20 tex"),
     L: float = positive(1e-3, "m", "10 yarns a centimetre"),
     R: float = positive(0.1e-3, "m", "20 tex with a density of 600 kg/m^3"),

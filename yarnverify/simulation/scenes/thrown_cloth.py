@@ -62,12 +62,12 @@ def thrown_cloth(
         p = cloth.points(end.motion.P) if end.motion else cloth.points(cloth.Q)
         return np.cross(end.points - share @ end.points, p).sum(0)
 
-    # nothing but rounding for the midpoint rule, and the others as far as they get with a hundred steps
+    # nothing but rounding for the midpoint rule, and the others as far as they get with 60 steps
     order = None if scheme == "midpoint" else ORDERS[scheme]
-    within = {"midpoint": 1e-11, "bdf2": 1e-3, "implicit_euler": 2e-2}[scheme]
+    within = {"midpoint": 1e-12, "bdf2": 1e-3, "implicit_euler": 2e-2}[scheme]
     known = [
         Known("momentum", "kg m/s", total * np.array([0, 0, speed - g * until]),
-              lambda end: cloth.points(end.motion.P).sum(0) if end.motion else 0 * fallen, within=1e-11,
+              lambda end: cloth.points(end.motion.P).sum(0) if end.motion else 0 * fallen, within=1e-12,
               scale=total * (abs(speed) + g * until)),
         Known("way of the centre", "m", fallen, lambda end: share @ (end.points - cloth.points(cloth.Q)), order, within,
               scale=abs(speed) * until + g * until**2 / 2),

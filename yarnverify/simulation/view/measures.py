@@ -87,7 +87,7 @@ def turning(fabric: Fabric, Q: ArrayLike) -> Measure:
     """Turning angle of each yarn at its nodes, degrees."""
     made, q = _elements(fabric, Q, bends)
     return Measure(
-        "bending angle", "°", _at(fabric, made, np.degrees(_angle(q[3:6] - q[:3], q[:3] - q[6:9]))), "nodes", least=1e-5
+        "bending angle", "°", _at(fabric, made, np.degrees(_angle(q[3:6] - q[:3], q[:3] - q[6:9]))), "nodes", least=1e-9
     )
 
 
