@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from yarnverify import cli
-from yarnverify.accuracy.cells import kernel
+from yarnverify.accuracy.cells import Unit, kernel, run_unit
 from yarnverify.accuracy.truth import Points, truth
 from yarnverify.errors import InputError
 from yarnverify.generation import generate_kernels
@@ -168,6 +168,12 @@ KINDS["fan"] = """
 def fan(x0: Point, x1: Point, x2: Point, x3: Point, *, k: Positive["N m"], a: Real["rad"]):
     return k / 2 * ((angle(x1 - x0, x2 - x0) - a) ** 2 + angle(x2 - x0, x3 - x0) ** 2)  # x1 and x3 do not feel each other
 """
+KINDS["green"] = """
+@energy(domain=lambda u0, u1: u1 > u0)
+def green(x0: Point, x1: Point, u0: Sliding, u1: Sliding, *, k: Positive["N"]):
+    l, du = length(x1 - x0), u1 - u0
+    return k * (l**2 - du**2) ** 2 / du**3
+"""
 KINDS["strain"] = """
 @energy()
 def strain(u0: Sliding, u1: Sliding, *, k: Positive["N"], L: Positive["m"]):
@@ -208,8 +214,16 @@ def test_kernels_of_any_energy_agree_with_ball_arithmetic(kinds: Path, name: str
 def test_what_an_energy_promises_is_what_it_can_keep(kinds: Path) -> None:
     promises = {name: kernel("accurate", name, kinds).KERNEL.promise for name in KINDS}
     expected = {"hinge": "none", "spring": "units", "torsion": "condition", "barrier": "none", "fibre": "none"}
-    expected |= {"signed": "none", "strain": "none", "fan": "none"}
+    expected |= {"green": "units", "signed": "none", "strain": "none", "fan": "none"}
     assert promises == expected
+
+
+@pytest.mark.parametrize("regime", ["moderate", "ratios", "sliding", "scales"])
+def test_a_difference_of_coordinates_is_not_opened_in_a_power(kinds: Path, regime: str) -> None:
+    """``3 l^2 + (u1 - u0)^2`` has no digit left where the square is opened and the coordinates are far from 0."""
+    unit = Unit("green", "float64", regime, ("accurate", "fast"), 60, 1, False, str(kinds))
+    for cell in run_unit(unit)["cells"]:
+        assert [found["of_target"] <= 1 for found in cell["outputs"].values()] == [True] * 3
 
 
 def test_a_contact_acts_only_within_its_distance(kinds: Path) -> None:

@@ -98,7 +98,7 @@ def _differentials(
                 value = differentiate(value, scalar_symbol(key))
             else:
                 value = differentiate(value, variables[key]) * (sign if isinstance(key, Corner) else 1)
-        return settled(sp.factor(value))
+        return settled(_factored(value, safe.derivation))
 
     safe.slopes.update(
         tree=scalar_tree,
@@ -112,6 +112,20 @@ def _differentials(
     for key in variables:  # whatever the law has no safe form for shows here
         safe.slopes["tree"](safe.slopes["d"](key))
         safe.slopes["tree"](safe.slopes["dd"](key))
+
+
+def _factored(value: Any, derivation: Derivation) -> Any:
+    """In factors, in which the difference of two sliding coordinates stays one: opened, its square would cancel digits."""
+    found = sp.factor(value)
+    slides = [scalar_symbol(name) for name in derivation.unknowns if not name.bold]
+    products = any(not term.as_coeff_Mul()[1].is_Symbol for each in found.atoms(sp.Add) for term in each.args)
+    if len(slides) == 2 and products:
+        first, last = slides
+        apart = sp.Symbol("apart", real=True)
+        closed = sp.factor(found.subs(last, first + apart))
+        if first not in closed.free_symbols:
+            return closed.subs(apart, last - first)
+    return found
 
 
 def _in_cosine(law: Any, theta: Any, c: Any) -> Any:
