@@ -515,3 +515,21 @@ def test_a_perfect_kernel_meets_every_target_in_every_regime(
         assert not missed_targets({"cells": found}), regime.name
         for cell in found:
             assert all(part["worst"] is None or part["worst"] <= 1 for part in cell["outputs"].values()), regime.name
+
+
+def test_there_is_one_pass_rule() -> None:
+    """The sweep, the check of other code and the search allow the same error at the same condition number."""
+    from yarnverify.accuracy import cells, rule
+    from yarnverify.check import judge, show
+    from yarnverify.fuzzing.judge import LIMITS
+
+    assert cells.allowed is judge.allowed is show.allowed is rule.allowed
+    for dtype, unit in (("float64", 2.0**-53), ("float32", 2.0**-24)):
+        assert [rule.allowed(k, dtype) - 16 for k in (0.0, 1.0, 100.0)] == pytest.approx([0, 8, 800], rel=1e-4)
+        for k in (0.0, 3.0, 1e5, 1e20):
+            assert LIMITS["fast"].allowed(k, dtype) == rule.allowed(k, dtype)
+            assert LIMITS["accurate"].allowed(k, dtype) == 16
+        # a square of something of which h times its condition number changes twice its size: to the second order
+        k = 4 / (8 * unit)
+        assert rule.allowed(k, dtype) * unit == pytest.approx((1 + 4 / 2) ** 2 - 1, rel=1e-6)
+    assert rule.allowed(np.inf) == np.inf

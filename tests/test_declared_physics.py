@@ -11,9 +11,9 @@ import pytest
 import sympy as sp
 
 from tests.variants import kernel
-from yarnverify.accuracy.cells import allowed
 from yarnverify.accuracy.conditioning import condition
 from yarnverify.accuracy.metrics import measure
+from yarnverify.accuracy.rule import allowed
 from yarnverify.accuracy.truth import Points, truth
 from yarnverify.errors import InputError
 from yarnverify.kernels import gravity, kinetic, plane, sphere

@@ -4,6 +4,7 @@
     truth.py         the exact result at the exact floats, by ball arithmetic
     metrics.py       errors in units of the rounding, normwise and componentwise
     conditioning.py  what any method must lose, so that a loss is either the inputs' or the computation's
+    rule.py          what an error may be at a condition number
     frames.py        random and exact frames, numbers drawn by exponent, angles that the floats really have
     regimes.py       the hard cases, from the measures that an energy is made of
     cells.py         energy x variant x type x regime: one cell each, and the point that was worst

@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from yarnverify.accuracy.conditioning import condition, hessian_condition
-from yarnverify.accuracy.metrics import OUTPUTS, UNIT, Errors, measure, slices
+from yarnverify.accuracy.metrics import OUTPUTS, Errors, measure, slices
 from yarnverify.accuracy.regimes import curve_points, points_of, regimes
+from yarnverify.accuracy.rule import EXACT, allowed
 from yarnverify.accuracy.shape import shape_of
 from yarnverify.accuracy.truth import Points, Truth, truth
 from yarnverify.errors import InputError
@@ -26,8 +27,6 @@ from yarnverify.library import derivations
 from yarnverify.symbolic.declare import Energy, load_declarations
 
 Array = NDArray[Any]
-EXACT = 16.0  # units: what an accurate kernel may lose, whatever the condition
-AMPLIFIED = 8.0  # units per condition number: what one without compensation may lose on top
 
 
 @dataclass(frozen=True)
@@ -190,8 +189,7 @@ def _share(target: str, output: str, errors: Errors, conditions: _Conditions) ->
         share = math.inf
         for draws in (1, 0):  # a bound from below is cheaper, and often enough
             amplification = np.nan_to_num(conditions.at(output, int(point), draws if output == "H" else 0), nan=0.0)
-            with np.errstate(over="ignore"):  # an infinite condition allows any finite error
-                share = float(np.where(np.isinf(column), np.inf, column / allowed(amplification)).max())
+            share = float(np.where(np.isinf(column), np.inf, column / allowed(amplification)).max())
             if share <= 1 or output != "H":
                 break
         if share > worst:
@@ -342,16 +340,6 @@ def label(error: float, amplification: float | None) -> str:
     if error <= EXACT or amplification is None:
         return "exact"
     return "conditioning" if error <= allowed(amplification) else "computation"
-
-
-def allowed(amplification: Any) -> Any:
-    """Units that a method without compensation may lose at a condition number.
-
-    A relative change h of the inputs changes a square, as an energy near rest is one, by c h + (c h)^2 / 4; here h is
-    ``AMPLIFIED`` units. The second term counts only where the first leaves no digit.
-    """
-    first = AMPLIFIED * amplification
-    return EXACT + first + first * first * (UNIT["float64"] / 4)
 
 
 def _spread(conditions: _Conditions, exact: Truth) -> dict[str, Any]:

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.accuracy.cells import AMPLIFIED
 from yarnverify.accuracy.conditioning import condition, hessian_condition
 from yarnverify.accuracy.metrics import UNIT, blocks_of, slices
 from yarnverify.accuracy.regimes import points_of, regimes, vector_parameters
+from yarnverify.accuracy.rule import AMPLIFIED
 from yarnverify.accuracy.shape import shape_of
 from yarnverify.accuracy.truth import Points, Truth, truth
 from yarnverify.errors import InputError

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.accuracy.cells import AMPLIFIED, EXACT
 from yarnverify.accuracy.metrics import UNIT, norm, true_parts
+from yarnverify.accuracy.rule import EXACT, allowed
 from yarnverify.check.cases import Cases
 from yarnverify.check.conventions import Results
 
@@ -61,11 +61,6 @@ class Block:
         if self.kind == "E":
             return "energy"
         return f"{'gradient' if self.kind == 'G' else 'Hessian'} {self.name.replace(',', ', ')}"
-
-
-def allowed(condition: float) -> float:
-    """The pass rule: units that an error may have at a condition number."""
-    return EXACT + AMPLIFIED * condition
 
 
 def block_places(kind: str, cases: Cases) -> list[tuple[str, tuple[slice, ...]]]:
@@ -129,9 +124,9 @@ def _worst(kind: str, name: str, errors: Array, cases: Cases) -> tuple[int, floa
     if not over.size:
         at = int(known.argmax())
         condition = cases.condition(kind, name, at)
-        return at, float(known[at]) / allowed(condition), condition
+        return at, float(known[at]) / allowed(condition, cases.dtype), condition
     bounds = {
-        int(at): float(known[at]) / allowed(cases.condition(kind, name, int(at), 1 if kind == "H" else 0))
+        int(at): float(known[at]) / allowed(cases.condition(kind, name, int(at), 1 if kind == "H" else 0), cases.dtype)
         for at in over
     }
     best, place, found = -1.0, int(over[0]), 0.0
@@ -139,7 +134,7 @@ def _worst(kind: str, name: str, errors: Array, cases: Cases) -> tuple[int, floa
         if bounds[at] <= best:
             break
         condition = cases.condition(kind, name, at)
-        share = float(known[at]) / allowed(condition)
+        share = float(known[at]) / allowed(condition, cases.dtype)
         if share > best:
             best, place, found = share, at, condition
     return place, best, found
@@ -156,5 +151,5 @@ def failing(block: Block, cases: Cases) -> Array:
     found = np.zeros(len(cases), bool)
     for at in np.flatnonzero(np.nan_to_num(block.errors, nan=0.0) > EXACT):
         condition = cases.condition(block.kind, block.name, int(at), 1 if block.kind == "H" else 0)
-        found[at] = block.errors[at] > allowed(condition)
+        found[at] = block.errors[at] > allowed(condition, cases.dtype)
     return found

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from yarnverify.accuracy.cells import AMPLIFIED, EXACT, significant
+from yarnverify.accuracy.cells import significant
 from yarnverify.accuracy.metrics import UNIT
+from yarnverify.accuracy.rule import AMPLIFIED, EXACT, allowed
 from yarnverify.check.command import Checked
 from yarnverify.check.conventions import by_component
-from yarnverify.check.judge import Block, allowed
+from yarnverify.check.judge import Block
 from yarnverify.check.recognise import Diagnosis
 
 RULE = (

@@ -13,7 +13,7 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import NDArray
 
-from yarnverify.accuracy.cells import AMPLIFIED, EXACT
+from yarnverify.accuracy.rule import AMPLIFIED, EXACT
 from yarnverify.export.vectors import Vectors
 
 Array = NDArray[Any]

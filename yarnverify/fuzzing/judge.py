@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from yarnverify.accuracy.conditioning import condition, hessian_condition
-from yarnverify.accuracy.metrics import UNIT, Errors, measure
+from yarnverify.accuracy.metrics import Errors, measure
+from yarnverify.accuracy.rule import AMPLIFIED, EXACT, allowed
 from yarnverify.accuracy.truth import Points, Truth, truth
 from yarnverify.errors import InputError
 from yarnverify.kernels import ElementError
@@ -27,15 +28,22 @@ Output = Literal["E", "G", "H"]
 
 @dataclass(frozen=True)
 class Limit:
-    """What the error of a block may be, in its norm: ``rounding + conditioning * condition number``, in units u."""
+    """What the error of a block may be, in its norm and in units u: a number, or that and what its condition number explains.
+
+    With ``conditioning``, units for each unit of the condition number, it is the rule of ``accuracy.rule``.
+    """
 
     rounding: float
     conditioning: float = 0.0
 
+    def allowed(self, condition: float, dtype: str) -> float:
+        """Units that an error may have."""
+        return float(allowed(min(condition, 1e150), dtype)) if self.conditioning else self.rounding
+
 
 # Kernels that promise less, or nothing, are held to what plain arithmetic on safe formulas can reach.
-_PLAIN = Limit(16.0, 8.0)
-LIMITS = {"accurate": Limit(16.0), "fast": _PLAIN, "reference": Limit(1.0)}
+_PLAIN = Limit(EXACT, AMPLIFIED)
+LIMITS = {"accurate": Limit(EXACT), "fast": _PLAIN, "reference": Limit(1.0)}
 
 
 @dataclass(frozen=True)
@@ -170,28 +178,22 @@ def _compare(
         return [], worst
     conditions = np.zeros(len(sizes))
     if limit.conditioning:
-        conditions = np.nan_to_num(_conditions(output, energy, points, true, limit, str(computed.dtype)), nan=np.inf)
+        conditions = np.nan_to_num(_conditions(output, energy, points, true), nan=np.inf)
     flaws, worst = [], 0.0
     for block, size, number in zip(errors.blocks, sizes, conditions, strict=True):
-        allowed = limit.rounding + limit.conditioning * min(float(number), 1e300)
+        most = limit.allowed(float(number), str(computed.dtype))
         where = f"{output} {block}".strip()
-        worst = max(worst, float(size / allowed) if size == size else 0.0)  # NaN: the truth does not fit
+        worst = max(worst, float(size / most) if size == size else 0.0)  # NaN: the truth does not fit
         if size == np.inf:
             flaws.append(Flaw("not finite", where, f"{where} is not finite where the truth is"))
-        elif size > allowed:
-            text = f"{where} is wrong by {size:.3g} u, allowed are {allowed:.3g} u"
-            flaws.append(Flaw("error", where, text, float(size / allowed)))
+        elif size > most:
+            text = f"{where} is wrong by {size:.3g} u, allowed are {most:.3g} u"
+            flaws.append(Flaw("error", where, text, float(size / most)))
     return flaws, worst
 
 
-def _conditions(output: str, energy: Energy, points: Points, true: Truth, limit: Limit, dtype: str) -> Array:
-    """Condition numbers of the blocks; that of the energy to second order, since at rest its gradient vanishes."""
-    if output == "H":
-        return hessian_condition(energy, points, true, 0)
-    first = condition(output, energy, points, true)[:, 0]
-    if output == "G":
-        return first
-    at = np.abs(points.q[:, 0])
-    with np.errstate(all="ignore"):
-        second = at @ np.abs(true.hessian[..., 0]) @ at / max(abs(true.energy[0]), float(np.finfo(dtype).tiny))
-        return first + limit.conditioning * UNIT[dtype] * second / 2
+def _conditions(output: str, energy: Energy, points: Points, true: Truth) -> Array:
+    """Condition numbers of the blocks."""
+    return (
+        hessian_condition(energy, points, true, 0) if output == "H" else condition(output, energy, points, true)[:, 0]
+    )
