@@ -144,7 +144,7 @@ def promised(energy: str, variant: str, element: Element) -> float:
     true = truth(declared(energy), points)
     size = abs(true.energy[0])
     if variant in PORTABLE:
-        limit = limit_of(variant)
+        limit = limit_of(kernel(energy, variant))
         change = float(np.abs(true.energy_moves[:, 0]).sum()) if limit.conditioning else 0.0
         return U * (limit.rounding * size + limit.conditioning * change)
     # Formulas in terms of the cosine, or of the stretch: a few roundings of that, and what they do to the energy.
