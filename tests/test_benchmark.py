@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.commands import status_of
 from yarnverify.accuracy.metrics import measure
 from yarnverify.benchmark import run
 from yarnverify.benchmark.contestants import Contestant, contestants, kernels
@@ -22,7 +23,6 @@ from yarnverify.benchmark.inputs import STATES, error_states, timed_states
 from yarnverify.benchmark.peers import PEERS
 from yarnverify.benchmark.timing import Spread, paired, speedups, spread
 from yarnverify.benchmark.ways import Way, empty_outputs, unified
-from yarnverify.cli import main
 from yarnverify.errors import InputError
 from yarnverify.kernels import VARIANTS
 from yarnverify.report.benchmark import benchmark_table, tables
@@ -387,12 +387,7 @@ def test_bad_options(options: dict[str, Any], message: str) -> None:
 
 
 def command(monkeypatch: pytest.MonkeyPatch, *words: str) -> int:
-    monkeypatch.setattr(sys, "argv", ["yarnverify", "benchmark", *words])
-    try:
-        main()
-    except SystemExit as stopped:
-        return int(stopped.code or 0)
-    return 0
+    return status_of(monkeypatch, "benchmark", *words)
 
 
 def test_the_command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

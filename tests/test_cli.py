@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 
-from yarnverify import __version__, cli
+from tests.commands import caller
+from yarnverify import __version__
 from yarnverify.errors import NotRunError
 from yarnverify.library import MAIN_DOCUMENT
 
@@ -31,7 +32,6 @@ def spring(u1: Sliding, *, k: Positive["N/m"]):
 """
 ERRATUM = '[[erratum]]\ndocument = "d.md"\nequation = "2"\nchange = "none"\nreason = "slip"\n'
 
-Run = tuple[int, str, str]
 
 # it suspects that a test forgot to say what to parse; these set sys.argv, as the installed command finds it
 pytestmark = pytest.mark.filterwarnings("ignore:Cyclopts application invoked without tokens")
@@ -50,18 +50,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def run(home: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
     """Run the command with arguments: exit status, standard output, standard error."""
-
-    def command(*args: str) -> Run:
-        monkeypatch.setattr(sys, "argv", ["yarnverify", *args])
-        try:
-            cli.main()
-            status = 0
-        except SystemExit as stop:
-            status = int(stop.code or 0)
-        out, err = capsys.readouterr()
-        return status, out, err
-
-    return command
+    return caller(monkeypatch, capsys)
 
 
 def one_line(err: str) -> str:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from yarnverify import cli
+from tests.commands import caller
 from yarnverify.accuracy.cells import Unit, kernel, run_unit
 from yarnverify.accuracy.truth import Points, truth
 from yarnverify.errors import InputError
@@ -23,7 +23,6 @@ from yarnverify.init import init
 from yarnverify.project import find, project
 from yarnverify.symbolic.loading import load_declarations
 
-Run = tuple[int, str, str]
 HEAD = "from yarnverify.symbolic.declare import *\n"
 
 pytestmark = pytest.mark.filterwarnings("ignore:Cyclopts application invoked without tokens")
@@ -39,17 +38,7 @@ def run(place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixt
     """Run the command in the folder: exit status, standard output, standard error."""
     monkeypatch.chdir(place)
     monkeypatch.setenv("XDG_CACHE_HOME", str(place / "cache"))
-
-    def command(*args: str) -> Run:
-        monkeypatch.setattr(sys, "argv", ["yarnverify", *args])
-        try:
-            cli.main()
-            status = 0
-        except SystemExit as stop:
-            status = int(stop.code or 0)
-        return status, *capsys.readouterr()
-
-    return command
+    return caller(monkeypatch, capsys)
 
 
 # -- a start ----------------------------------------------------------------------------------------------------------

@@ -6,14 +6,13 @@ import json
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from yarnverify import cli
+from tests.commands import caller
 from yarnverify.check.cases import hard_cases
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.export.command import export
@@ -57,17 +56,7 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(own: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
     """Run the command beside the folder: exit status, standard output, standard error."""
     monkeypatch.chdir(own.parent)
-
-    def command(*args: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["yarnverify", *args])
-        try:
-            cli.main()
-            status = 0
-        except SystemExit as stop:
-            status = int(stop.code or 0)
-        return status, *capsys.readouterr()
-
-    return command
+    return caller(monkeypatch, capsys)
 
 
 def test_errors_with_a_vector_are_measured_at_moderate_states_and_replayed(run: Any, tmp_path: Path) -> None:

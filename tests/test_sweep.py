@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
+from tests.commands import status_of
 from yarnverify.accuracy import command, sweep
 from yarnverify.accuracy.cells import Unit, run_unit
 from yarnverify.accuracy.record import grown, make_record, read_record, record_text
 from yarnverify.accuracy.sweep import PROFILES, executor_named, finish, plan, run, state_folder
-from yarnverify.cli import main
 from yarnverify.errors import InputError, NotRunError
 
 TINY = replace(PROFILES["quick"], count=4, orientations=1)
@@ -214,12 +214,7 @@ def small(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 
 
 def call(arguments: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
-    monkeypatch.setattr("sys.argv", ["yarnverify", "accuracy", *arguments])
-    try:
-        main()
-    except SystemExit as stop:
-        return int(stop.code or 0)
-    return 0
+    return status_of(monkeypatch, "accuracy", *arguments)
 
 
 def test_the_record_is_written_and_compared(small: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
