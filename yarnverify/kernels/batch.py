@@ -108,7 +108,7 @@ class Batch:
 
     def tame(self, rows: Array) -> bool:
         """Whether no coordinate is of extreme size, infinite or NaN."""
-        size = np.abs(rows, out=scratch("sizes", *rows.shape, self.dtype))
+        size = np.abs(rows, out=scratch("sizes", self.dof, rows.shape[1], self.dtype))
         if not size.max(initial=0) < self.limit:  # so it is with NaN
             return False
         bits = size.view(f"u{size.itemsize}")  # in the order of the numbers, and less 1 zero is the largest
@@ -338,9 +338,11 @@ class Batch:
 
     def _in_double(self, rows: Array, values: list[Any], found: Array, reasons: Array) -> None:
         """Single precision's elements in double precision, whose range holds their products."""
-        wider = [np.asarray(value, np.float64) for value in values]
-        names = [name for name, *_ in self.kernel.parameters]
-        batch = Batch(self.kernel, self.wanted, rows.astype(np.float64), dict(zip(names, wider, strict=True)), errors="mask")
+        wider = np.broadcast_arrays(*[np.asarray(value, np.float64) for value in values])
+        given: dict[str, Any] = dict(zip((name for name, _ in self.kernel.parameters), wider, strict=True))
+        for vector in self.kernel.vectors:
+            given[vector] = np.array([given.pop(f"{vector}_{axis}") for axis in "xyz"])
+        batch = Batch(self.kernel, self.wanted, rows.astype(np.float64), given, errors="mask")
         found[:] = np.vstack(batch.results())
         for element, reason in batch.reasons.items():
             if not reason.startswith("the result") and not reasons[element]:
