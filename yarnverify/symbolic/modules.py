@@ -193,7 +193,7 @@ def module_text(
         "functions": functions,
         "scaling": "points" if angles_alone else "lengths",
         "portable": not LIBRARY & set(tape),
-        "promise": promise(variant, found, bool(LIBRARY & set(tape))),
+        "promise": promise(variant, found, LIBRARY & set(tape)),
         "numbers": numbers(variant, found),
         "public": (
             ("energy", "(n,)", "Energy of each element", energy.unit, "Array"),
