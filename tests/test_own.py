@@ -22,6 +22,7 @@ from yarnverify.generation import generate_kernels
 from yarnverify.init import init
 from yarnverify.project import find, project
 from yarnverify.symbolic.loading import load_declarations
+from yarnverify.tutorial import importing_from
 
 HEAD = "from yarnverify.symbolic.declare import *\n"
 
@@ -65,13 +66,13 @@ def test_a_start_is_whole_and_reports_at_once(started: Path, run: Any) -> None:
         assert run(*check)[0] == 0
 
 
-def test_the_examples_of_a_start_run(started: Path, run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_examples_of_a_start_run(started: Path, run: Any) -> None:
     run("generate", "my_model")
     text = (started / "README.md").read_text(encoding="utf-8")
-    monkeypatch.syspath_prepend(str(started.parent))
     test = doctest.DocTestParser().get_doctest(text, {}, "README.md", "README.md", 0)
     runner = doctest.DocTestRunner()
-    runner.run(test)
+    with importing_from(started.parent):
+        runner.run(test)
     assert runner.failures == 0 and runner.tries >= 5
     commands = [line.partition("#")[0].split()[1:] for line in text.splitlines() if line.startswith("yarnverify ")]
     assert [command[0] for command in commands] == ["report", "prove", "derive", "generate", "accuracy"]
@@ -394,10 +395,11 @@ def test_a_chain_of_inequalities_in_python_is_refused_with_advice(tmp_path: Path
         load_declarations(tmp_path)
 
 
-def test_kernels_of_ones_own_are_imported_like_any_module(kinds: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(kinds.parent))
-    spring = importlib.import_module("kinds.kernels.spring")
-    assert spring.VARIANT == "accurate"
+def test_kernels_of_ones_own_are_imported_like_any_module(kinds: Path) -> None:
+    with importing_from(kinds.parent):
+        spring = importlib.import_module("kinds.kernels.spring")
+        assert spring.VARIANT == "accurate"
+    assert "kinds.kernels.spring" not in sys.modules
     assert spring.energy(np.array([[0.0, 0, 0, 2, 0, 0]]).T, k=2.0, L=1.0)[0] == 1.0
     code = "import kinds.kernels.spring, sys; print('sympy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], cwd=kinds.parent, capture_output=True, text=True, check=True)
