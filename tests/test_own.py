@@ -343,6 +343,23 @@ MISTAKES = {  # text after the import in line 1, line and column, words
     "a component": (declared("k * L * x0.z"), "4:20", "a component of a point is dot(x0, e), with"),
     "abs": (declared("k * L * abs(dot(x0, x1))"), "4:20", "length(a) is the size of a number too"),
     "a branch": (declared("k * max(length(x1 - x0) - L, 0) ** 2"), "4:16", 'elsewhere="zero"): where it acts'),
+    "a decimal number": (declared("0.15 * k * L**2"), "4:12", "write 3 * k / 20 for 0.15 * k, or Fraction(3, 20) of"),
+    "pi in digits": ("import math\n" + declared("math.pi * k * L**2"), "5:12", "whose numbers are exact: write PI"),
+    "many digits": (declared("0.12345678 * k"), "4:12", 'write Fraction("0.12345678") of the module fractions'),
+    "a root as a power": (declared("k * L**0.5"), "4:16", "an exponent must be an integer, not 0.5; write sqrt(...)"),
+    "a power of a formula": (declared("2**k"), "4:12", "whole powers, no **; other powers are exp(p * log(a))"),
+    "a remainder": (declared("k % 2"), "4:12", "a formula has + - * / and whole powers, no %"),
+    "an index": (declared("k * L * x0[2]"), "4:20", "a formula is not a list; a component of a point is dot(x0, e)"),
+    "a method": (declared("k * x0.norm()"), "4:16", "a formula has no .norm; use the functions angle, "),
+    "a missing star": (declared("k(L)"), "4:12", "a formula is not a function; is a * missing?"),
+    "NumPy": ("import numpy as np\n" + declared("np.sqrt(k)"), "5:12", "NumPy computes with numbers, and a formula is"),
+    "a constant vector": (
+        declared("dot(x0, [0, 0, 1])"),
+        "4:12",
+        'no constant vectors: make it a parameter e: Vector["1"]',
+    ),
+    "a length of a number": (declared("length(0.5)"), "4:12", "0.5 cannot stand in a formula"),
+    "another error": (declared("{}['k']"), "4:12", "KeyError: 'k'"),
     "no unknown": ('@energy()\ndef e(*, k: Positive["J"]):\n    return k\n', "3:1", "has no unknown"),
 }
 
@@ -354,6 +371,7 @@ def test_a_mistake_in_an_energy_is_one_line_at_its_place(tmp_path: Path, run: An
     status, out, err = run("report", str(tmp_path))
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert err.startswith(f"{tmp_path / 'e.py'}:{where}: ") and words in err
+    assert "TypeError" not in err and "Expr" not in err  # a message of ours, not of Python's insides
 
 
 @pytest.mark.parametrize(
