@@ -38,6 +38,16 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
         sys.settrace(trace)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def nothing_is_left_to_import(tmp_path_factory: pytest.TempPathFactory) -> Generator[None]:
+    """A module or a search path of one file's temporary folders would be found by the next file, or not, by their order."""
+    yield
+    places = {name: str(getattr(module, "__file__", None)) for name, module in sys.modules.items()}
+    places |= {f"sys.path: {place}": place for place in sys.path}
+    base = tmp_path_factory.getbasetemp()
+    assert [name for name, place in places.items() if Path(place).is_relative_to(base)] == []
+
+
 @pytest.fixture(scope="session")
 def folder() -> Path:
     return derivations()

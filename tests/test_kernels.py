@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from yarnverify import kernels
 from yarnverify.generation import DEFAULT_VARIANT
+from yarnverify.kernels.inputs import ElementError
 from yarnverify.kernels.memory import LINE, aligned, scratch
 from yarnverify.symbolic.derive import declared_section
 from yarnverify.symbolic.forward import Evaluation
@@ -194,6 +195,26 @@ def test_batches_longer_than_a_chunk(energy: str) -> None:
     times = 2 * CHUNK // 5 + 3
     many = module.energy(np.tile(q, times), **{name: np.tile(value, times) for name, value in parameters.items()})
     np.testing.assert_allclose(many.reshape(times, 5), np.tile(module.energy(q, **parameters), (times, 1)), rtol=1e-14)
+
+
+@EACH
+@pytest.mark.parametrize("n", [5, 8193, 40001])  # one chunk; two; several
+def test_threads_give_the_same_bits(energy: str, n: int) -> None:
+    """Whatever their number, and wherever elements in the second shape and without a value are."""
+    module = kernel(energy)
+    q, parameters = state(energy, n=n)
+    if energy == "parallel_contact":
+        q[1, ::3] += 9  # too far
+    else:
+        q[3:6, ::3] = 2 * q[0:3, ::3] - q[3:6, ::3]
+    q[0, [n // 3, n - 1]] = np.nan
+    one = module.packed(q, **parameters, errors="mask")
+    assert np.flatnonzero(np.isnan(one[0])).tolist() == [n // 3, n - 1]
+    for threads in (2, 3):
+        found = module.packed(q, **parameters, errors="mask", threads=threads)
+        assert [a.tobytes() for a in found] == [a.tobytes() for a in one]
+        with pytest.raises(ElementError, match=f"element {n // 3}: "):
+            module.packed(q, **parameters, threads=threads)
 
 
 @EACH

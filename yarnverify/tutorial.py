@@ -59,27 +59,34 @@ def run(folder: Path, advance: Advance = lambda label, total: None) -> dict[str,
     found = list(parts(SOURCE.read_text(encoding="utf-8")))
     folder = folder.resolve()
     names: dict[str, Any] = {"__name__": "__main__"}
-    known = set(sys.modules)
+    with importing_from(folder), contextlib.chdir(folder):
+        for part in found:
+            if part["kind"] == "file":
+                Path(part["more"]).write_text(part["text"], encoding="utf-8")
+            elif part["kind"] == "commands":
+                done = [_command(line) for line in part["text"].splitlines()]
+                part["output"] = _shortened("".join(text for text, _ in done), part["more"])
+                part["status"] = [status for _, status in done]
+            elif part["kind"] == "examples":
+                importlib.invalidate_caches()  # kernels may have been written a moment ago
+                part["text"] = "".join(_examples(part["text"], names))
+            advance(part["kind"], len(found))
+    return {"schema": 1, "command": "yarnverify tutorial --write", "parts": found}
+
+
+@contextlib.contextmanager
+def importing_from(folder: Path) -> Iterator[None]:
+    """Modules of a folder can be imported, and are forgotten at the end; another folder may have others of their names."""
+    folder, known = folder.resolve(), set(sys.modules)
     sys.path.insert(0, str(folder))
     try:
-        with contextlib.chdir(folder):
-            for part in found:
-                if part["kind"] == "file":
-                    Path(part["more"]).write_text(part["text"], encoding="utf-8")
-                elif part["kind"] == "commands":
-                    done = [_command(line) for line in part["text"].splitlines()]
-                    part["output"] = _shortened("".join(text for text, _ in done), part["more"])
-                    part["status"] = [status for _, status in done]
-                elif part["kind"] == "examples":
-                    importlib.invalidate_caches()  # kernels may have been written a moment ago
-                    part["text"] = "".join(_examples(part["text"], names))
-                advance(part["kind"], len(found))
+        yield
     finally:
         sys.path.remove(str(folder))
         for name in set(sys.modules) - known:
-            if str(folder) in str(getattr(sys.modules[name], "__file__", "")):
+            places = [getattr(sys.modules[name], "__file__", None), *getattr(sys.modules[name], "__path__", ())]
+            if any(place and Path(place).resolve().is_relative_to(folder) for place in places):
                 del sys.modules[name]
-    return {"schema": 1, "command": "yarnverify tutorial --write", "parts": found}
 
 
 def _command(line: str) -> tuple[str, int]:

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from yarnverify.kernels.runtime import Kernel
 
 CHUNK = 8192  # elements at a time, so that scratch memory stays in the cache
+# Threads wait for the interpreter between any two calls of NumPy, which must be long beside that.
+_SHARED = 4 * CHUNK
 
 # Lengths, sines and parameters within these powers of two, and coordinates of at most this size that are zero or at least so
 # small, can neither overflow nor underflow in any product that occurs.
@@ -219,15 +221,19 @@ class Batch:
     # -- many
 
     def _chunks(self) -> None:
-        starts = [*range(0, self.n, CHUNK), self.n]
-        ranges = [slice(a, b) for a, b in pairwise(starts)]
-        if self.threads == 1 or len(ranges) == 1:
+        threads = min(self.threads, -(-self.n // CHUNK))
+        if threads == 1:
             self._kept = self._kept or self._worker()
-            self._some(ranges, self._kept)
+            self._some(self._ranges(CHUNK), self._kept)
             return
-        shares = [ranges[i :: self.threads] for i in range(self.threads)]
-        for done in [_pool(self.threads).submit(self._some, share) for share in shares]:
+        most = CHUNK if self.engine == "compiled" else _SHARED
+        rounds = -(-self.n // (threads * most))
+        ranges = self._ranges(-(-self.n // (threads * rounds)))
+        for done in [_pool(threads).submit(self._some, ranges[i::threads]) for i in range(threads)]:
             done.result()
+
+    def _ranges(self, size: int) -> list[slice]:
+        return [slice(a, b) for a, b in pairwise([*range(0, self.n, size), self.n])]
 
     def _worker(self) -> Worker:
         if self.engine == "compiled" and self.kernel.numbers != "double-double":

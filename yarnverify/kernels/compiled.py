@@ -35,7 +35,7 @@ _MAKING = threading.Lock()  # threads that share a batch make its loop once
 _INFIX = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
 _PREFIX = {"negative": "-", "positive": "+"}
 _CALLS = {"absolute": "abs", "sqrt": "sqrt", "arccos": "acos"} | {
-    name: name for name in ("cos", "exp", "log", "sin", "tan")
+    name: name for name in ("cos", "exp", "expm1", "log", "log1p", "sin", "sinh", "tan")
 }
 
 
@@ -54,7 +54,7 @@ def source_of(tape: Tape, layout: str) -> str:
     """
     given, found = tape.inputs * STRIDE, tape.outputs * STRIDE
     body = "\n            ".join(_statements(tape))
-    return f"""from math import acos, cos, exp, log, sin, sqrt, tan
+    return f"""from math import acos, cos, exp, expm1, log, log1p, sin, sinh, sqrt, tan
 
 import numpy as np
 from numba import njit, types

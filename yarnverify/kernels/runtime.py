@@ -33,7 +33,8 @@ class Options(TypedDict, total=False):
     out
         Arrays to write the results to, of their shapes and dtype.
     threads
-        Number of threads that share the chunks of a large batch.
+        Number of threads that share a large batch. Those of the compiled engine run beside each other; those of NumPy meet at
+        the interpreter's lock between any two calls and gain much less.
     engine
         ``numpy``, or ``compiled`` for one fused loop by numba, with the same bits.
     """

@@ -132,9 +132,18 @@ sin = _one_of("sin", math.sin)
 cos = _one_of("cos", math.cos)
 tan = _one_of("tan", math.tan)
 exp = _one_of("exp", math.exp)
+expm1 = _one_of("expm1", math.expm1)
+sinh = _one_of("sinh", math.sinh)
 log = _one_of("log", math.log)
+log1p = _one_of("log1p", math.log1p)
 maximum = _one_of("maximum", max)
 select = _one_of("select", lambda condition, yes, no: yes if condition > 0 else no)
+
+
+def log_ratio(ratio: Any, excess: Any) -> Any:
+    """Logarithm of a ratio, near 1 from what it exceeds 1 by."""
+    far = abs(excess) - 0.5
+    return select(far, log(ratio), log1p(select(far, 0.0, excess)))
 
 
 def power(value: Any, exponent: int) -> Any:

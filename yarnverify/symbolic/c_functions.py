@@ -19,7 +19,7 @@ from yarnverify.symbolic.reading import UnsupportedError
 Shape: TypeAlias = Any  # "s" for a scalar, or a tuple of shapes
 _BINARY = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
 _UNARY = {"negative": "-{}", "positive": "{}", "absolute": "fabs({})", "sqrt": "sqrt({})"}
-_LIBRARY = {"arccos": "acos", "sin": "sin", "cos": "cos", "tan": "tan"}
+_LIBRARY = {"arccos": "acos", "sin": "sin", "cos": "cos", "tan": "tan", "log": "log", "log1p": "log1p"}
 
 
 def flat(value: Any) -> list[Any]:

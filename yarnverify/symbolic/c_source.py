@@ -61,6 +61,8 @@ class _Printer(C99CodePrinter):  # type: ignore[misc]
 
     def _print_Function(self, expr: Any) -> str:
         name = expr.func.__name__
+        if name in ("expm1", "sinh"):
+            return f"{name}({self._print(expr.args[0])})"
         if name in ("sqrt", "acos", "sin", "cos", "tan", "Abs", "log", "exp"):
             return str(super()._print_Function(expr))
         c_name, _ = self.functions.named(name, ("s",) * len(expr.args))

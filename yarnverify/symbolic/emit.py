@@ -92,6 +92,9 @@ class Components(Reading):
     def exp(self, value: Any) -> Any:
         return sp.exp(value)
 
+    def safe(self, name: str, args: tuple[Expr, ...]) -> Any:
+        return sp.Function(name)(*map(self.value, args))
+
     def circle(self, angle: Any) -> tuple[Any, Any]:
         return self.hold(sp.sin(angle)), self.hold(sp.cos(angle))
 

@@ -12,17 +12,18 @@ Scalar = Expr | int | Fraction
 
 def length(a: Expr) -> Expr:
     """Length of a vector."""
-    return Expr("norm", (a,))
+    return Expr("norm", (as_expr(a),))
 
 
 def square(a: Expr) -> Expr:
     """Square of the length of a vector."""
+    a = as_expr(a)
     return Expr("mul", (a.T, a))
 
 
 def unit(a: Expr) -> Expr:
     """Direction of a vector."""
-    return Expr("frac", (a, length(a)))
+    return Expr("frac", (as_expr(a), length(a)))
 
 
 def angle(a: Expr, b: Expr) -> Expr:
@@ -32,12 +33,12 @@ def angle(a: Expr, b: Expr) -> Expr:
 
 def dot(a: Expr, b: Expr) -> Expr:
     """Scalar product of two vectors."""
-    return Expr("mul", (a.T, b))
+    return Expr("mul", (as_expr(a).T, as_expr(b)))
 
 
 def cross(a: Expr, b: Expr) -> Expr:
     """Vector product."""
-    return Expr("cross", (a, b))
+    return Expr("cross", (as_expr(a), as_expr(b)))
 
 
 def atan2(y: Scalar, x: Scalar) -> Expr:

@@ -6,14 +6,24 @@ from yarnverify.symbolic.tree import ONE, PI, Expr
 
 FUNCTIONS = ("sin", "cos", "tan", "cot", "arcsin", "arccos", "arctan", "log", "exp")
 OF_TWO = ("atan2",)  # written \operatorname{atan2}(y, x)
+SAFE = ("expm1", "sinh", "log_ratio")  # of safe forms alone; see ``vanishing``
 
 
 def unfolded(expr: Expr) -> Expr | None:
-    """A function by arc cosine, sine and cosine alone; None for these themselves and for ``tan``.
+    """A function by arc cosine, sine, cosine, exponential and logarithm alone; None for these themselves and for ``tan``.
 
     The angle of the point (x, y) is the arc cosine of its x, negative where y is; a norm never is.
     """
     match expr.value:
+        case "expm1":
+            return Expr("call", expr.args, "exp") - ONE
+        case "sinh":
+            return (Expr("call", expr.args, "exp") - Expr("call", (-expr.args[0],), "exp")) / 2
+        case "log_ratio":
+            ratio, excess = (
+                expr.args
+            )  # an excess that is not the ratio less 1 changes the value, so that proofs refuse it
+            return (ONE + excess) / ratio * Expr("call", (ratio,), "log")
         case "cot":
             return Expr("call", expr.args, "cos") / Expr("call", expr.args, "sin")
         case "arcsin":

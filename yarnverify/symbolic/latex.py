@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from yarnverify.symbolic.functions import OF_TWO
+from yarnverify.symbolic.functions import OF_TWO, SAFE
 from yarnverify.symbolic.tree import Expr, Name
 
 # The vocabulary that the grammar reads.
@@ -61,7 +61,7 @@ def _bare(expr: Expr) -> bool:
 
 
 def _call(expr: Expr, power: str = "") -> str:
-    if expr.value in OF_TWO:
+    if expr.value in (*OF_TWO, *SAFE):
         return f"\\operatorname{{{expr.value}}}\\left( {', '.join(map(latex, expr.args))} \\right)"
     arg = expr.args[0]
     name = "ln" if expr.value == "log" else expr.value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 import traceback
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from yarnverify.symbolic.dimensions import DimensionError, check_dimensions, dim
 from yarnverify.symbolic.energies import Declarations, Energy, Motion, Quantity
 from yarnverify.symbolic.formulas import FUNCTIONS
 from yarnverify.symbolic.places import part_of
-from yarnverify.symbolic.tree import Expr
+from yarnverify.symbolic.tree import Expr, FormulaError
 
 
 def load_declarations(folder: Path) -> Declarations:
@@ -60,7 +61,7 @@ def _run(path: Path) -> dict[str, Any]:
         frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
         line, column = (frames[-1].lineno, frames[-1].colno) if frames else (1, 0)
         place = str(path), line or 1, (column or 0) + 1
-        raise InputError(f"{type(error).__name__}: {_told(error)}", place) from None
+        raise InputError(_told(error), place) from None
     return namespace
 
 
@@ -68,21 +69,39 @@ def _told(error: Exception) -> str:
     """What an exception says, in one line, and what to do about the usual ones."""
     text = " ".join(str(error).split())
     if isinstance(error, NameError) and error.name:
-        known = {name.lower(): name for name in (*FUNCTIONS, *_ANNOTATIONS, "PI")}
-        near = difflib.get_close_matches(error.name.lower(), known, 1)
-        advice = f"did you mean {known[near[0]]}?" if near else f"formulas have the functions {', '.join(FUNCTIONS)}"
-        return f"{text}; import it from yarnverify.symbolic.declare, or: {advice}"
-    if isinstance(error, AttributeError) and error.name in ("x", "y", "z"):
-        return f'{text}; a component of a point is dot(x0, e), with a parameter e: Vector["1"]'
+        known = {name.lower(): name for name in (*FUNCTIONS, *_ANNOTATIONS)}
+        near = [known[name] for name in difflib.get_close_matches(error.name.lower(), known, 1)]
+        if error.name in near:
+            return f"{text}; import it from yarnverify.symbolic.declare"
+        return f"{text}; did you mean {near[0]}?" if near else f"{text}; formulas have the functions {_LIST}"
+    if not isinstance(error, FormulaError) and (Expr.__name__ in text or "ufunc" in text):
+        return _of_formulas(error, text)
+    # of these Python's own words say all; of others the name, as in KeyError: 'k'
+    plain = isinstance(error, TypeError | NameError | AttributeError | ImportError | ZeroDivisionError)
+    return text if plain and text else f"{type(error).__name__}: {text}"
+
+
+def _of_formulas(error: Exception, text: str) -> str:
+    """What Python has no operation for, since a formula is not a number."""
+    component = 'a component of a point is dot(x0, e), with a parameter e: Vector["1"]'
+    if isinstance(error, AttributeError):
+        has = component if error.name in ("x", "y", "z") else f"use the functions {_LIST}"
+        return f"a formula has no .{error.name}; {has}"
+    if "ufunc" in text:
+        return f"NumPy computes with numbers, and a formula is none: use the functions {_LIST}"
+    if "subscriptable" in text or "iterable" in text:
+        return f"a formula is not a list; {component}"
+    if "callable" in text:
+        return "a formula is not a function; is a * missing?"
     if "abs()" in text:
-        return f"{text}; length(a) is the size of a number too"
-    if Expr.__name__ in text or "ufunc" in text:
-        return (
-            f"{text}; a formula is no number: use the functions of yarnverify.symbolic.declare, {', '.join(FUNCTIONS)}"
-        )
-    return text
+        return "abs() is of numbers; length(a) is the size of a number too"
+    if operator := re.search(r"operand type\(s\) for (\S+?):? ", text):
+        other = {"@": "; dot(a, b) is the scalar product", "**": "; other powers are exp(p * log(a))"}
+        return f"a formula has + - * / and whole powers, no {operator[1]}{other.get(operator[1], '')}"
+    return f"a formula is no number: use the functions of yarnverify.symbolic.declare, {_LIST}"
 
 
+_LIST = ", ".join(FUNCTIONS)
 _ANNOTATIONS = (
     "Point",
     "Positive",

@@ -188,7 +188,7 @@ def module_text(
         "unpack": ", ".join(labels) + ("," if len(labels) == 1 else ""),
         "functions": functions,
         "portable": not LIBRARY & set(tape),
-        "promise": promise(variant, found, bool(LIBRARY & set(tape))),
+        "promise": promise(variant, found, LIBRARY & set(tape)),
         "numbers": numbers(variant, found),
         "public": (
             ("energy", "(n,)", "Energy of each element", energy.unit, "Array"),

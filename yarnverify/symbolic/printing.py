@@ -73,7 +73,8 @@ class _Divisions(_Printer):
 
 _PRINTER = _Printer({"fully_qualified_modules": False})
 _DIVISIONS = _Divisions({"fully_qualified_modules": False})
-LIBRARY = {"arccos", "cos", "exp", "log", "sin", "tan"}  # not correctly rounded, so not the same on every machine
+# not correctly rounded, so not the same on every machine
+LIBRARY = {"arccos", "cos", "exp", "expm1", "log", "log_ratio", "sin", "sinh", "tan"}
 _FUNCTIONS = {
     "tape": LIBRARY | {"power", "select", "sqrt"},
  "geometry": {

@@ -24,6 +24,7 @@ from yarnverify.symbolic.safe_program import safe_program
 from yarnverify.symbolic.steps import Program
 from yarnverify.symbolic.sums import Stages, is_rational
 from yarnverify.symbolic.tree import FORCE, Expr
+from yarnverify.symbolic.vanishing import KEPT, kept_by_sums
 
 _SUMS = "no measures: of the terms of each sum a word more is computed than of itself, since a word may cancel"
 
@@ -172,15 +173,19 @@ def _mend(section: Section, claim: Claim) -> tuple[tuple[Expr, ...], str]:
 
 
 def library_calls(programs: list[Program]) -> list[str]:
-    """The functions of a mathematical library that programs call."""
+    """The functions of a mathematical library that programs call, as a person declares them."""
     code = "\n".join(line for made in programs for line in (*statements(made), *map(text_of, made.outputs)))
-    return sorted(LIBRARY & set(used_functions(code, "tape")))
+    declared = {"expm1": "exp", "sinh": "exp", "log_ratio": "log"}
+    return sorted({declared.get(name, name) for name in LIBRARY & set(used_functions(code, "tape"))})
 
 
-def promise(variant: str, found: Proved, calls: bool) -> str:
-    """What errors a kernel promises; see ``runtime.Kernel``."""
-    if variant in ("differentiated", "printed") or calls or not (found.shapes or found.stages):
+def promise(variant: str, found: Proved, calls: set[str]) -> str:
+    """What errors a kernel promises that calls some functions of a library; see ``runtime.Kernel``."""
+    if variant in ("differentiated", "printed") or not (found.shapes or found.stages):
         return "none"
+    if calls:  # these carry on what their arguments lack, so more than a few units may be lost far from 0
+        kept = calls <= KEPT and found.shapes and all(kept_by_sums(shape) for shape in found.shapes)
+        return "condition" if kept else "none"
     if variant == "reference":
         return "units"
     if found.stages:

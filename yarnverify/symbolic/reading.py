@@ -11,7 +11,7 @@ from typing import Any
 
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.exponentials import NAMES
-from yarnverify.symbolic.functions import unfolded
+from yarnverify.symbolic.functions import SAFE, unfolded
 from yarnverify.symbolic.tree import Expr, Name
 
 Value = Any
@@ -55,6 +55,10 @@ class Reading(ABC):
     def exp(self, value: Any) -> Any:
         raise UnsupportedError("an exponential")
 
+    def safe(self, name: str, args: tuple[Expr, ...]) -> Any:
+        """A function of safe forms by itself; None where its meaning is to be read."""
+        return None
+
     pi: Any
 
     def hold(self, value: Any) -> Any:
@@ -86,7 +90,8 @@ class Reading(ABC):
         if op == "symbol":
             return self.symbol(expr.name)
         if op == "call" and (plain := unfolded(expr)) is not None:
-            return self.value(plain, blocks)
+            found = self.safe(str(expr.value), args) if expr.value in SAFE else None
+            return self.value(plain, blocks) if found is None else found
         values = [self.value(arg, blocks) for arg in args]
         match op:
             case "number":

@@ -14,6 +14,7 @@ from yarnverify.symbolic.measures import NoMeasuresError, differentiate, scalar_
 from yarnverify.symbolic.safe import Safe, Shape
 from yarnverify.symbolic.scalars import scalar_tree
 from yarnverify.symbolic.tree import Name
+from yarnverify.symbolic.vanishing import vanishes, without_cancellation
 
 
 def safe_shapes(derivation: Derivation) -> list[Safe]:
@@ -42,7 +43,8 @@ def _shape(derivation: Derivation, corner: Corner | None, shape: Shape) -> Safe:
     given = {name for m in derivation.measures if m.b is None for name in (m.a.l.name, m.a.d.name)}
     if corner is None:
         variables: dict[Any, Any] = {m: scalar_symbol(m.symbol) for m in derivation.measures}
-        safe = Safe(derivation, shape, None, False, section, scalar_tree(sp.factor(derivation.law)), frozenset(given))
+        law = without_cancellation(derivation.law) if vanishes(derivation.law) else sp.factor(derivation.law)
+        safe = Safe(derivation, shape, None, False, section, scalar_tree(law), frozenset(given))
         _differentials(safe, derivation.law, variables, lambda value: value)
         return safe
     given |= {s.l.name for s in (corner.a, corner.b)} | {s.d.name for s in (corner.a, corner.b)}
@@ -55,7 +57,8 @@ def _shape(derivation: Derivation, corner: Corner | None, shape: Shape) -> Safe:
     whole = {1 - c: atoms["versine"], c - 1: -atoms["versine"], 1 + c: atoms["vercosine"]}  # none of them cancels
 
     def factored(value: Any) -> Any:
-        value = sp.factor(value).replace(lambda e: e in whole, lambda e: whole[e])
+        value = without_cancellation(sp.factor(value)) if vanishes(value) else sp.factor(value)
+        value = value.replace(lambda e: e in whole, lambda e: whole[e])
         return value.subs(c, corner.sign * atoms["C"])
 
     if shape == "smooth":
@@ -116,6 +119,8 @@ def _differentials(
 
 def _factored(value: Any, derivation: Derivation) -> Any:
     """In factors, in which the difference of two sliding coordinates stays one: opened, its square would cancel digits."""
+    if vanishes(derivation.law):  # sums beside exponentials and logarithms have no factors: they would be opened
+        return without_cancellation(value)
     found = sp.factor(value)
     slides = [scalar_symbol(name) for name in derivation.unknowns if not name.bold]
     products = any(not term.as_coeff_Mul()[1].is_Symbol for each in found.atoms(sp.Add) for term in each.args)

@@ -109,7 +109,7 @@ class Sums:
 
     def safe(self, value: Any) -> Any:
         """An expression with every sum that may cancel replaced."""
-        return value.replace(self._is_sum, self._call)
+        return value.replace(self._is_mixed, self._parted).replace(self._is_sum, self._call)
 
     def ordered(self, value: Any) -> Any:
         """An expression in which a coordinate difference is taken before a length is added to it."""
@@ -117,7 +117,8 @@ class Sums:
 
     def apart(self, values: Iterable[Any]) -> Any:
         """What is positive where every sum with a length is more than rounding; None where there is no such sum."""
-        sums = {part for value in values for part in sp.sympify(value).atoms(sp.Add) if self._is_sum(part)}
+        every = {part for value in values for part in sp.sympify(value).atoms(sp.Add)}
+        sums = {part for part in (*every, *map(self._linear, every)) if self._is_sum(part)}
         found = {  # either sign of a sum
             -part if part.could_extract_minus_sign() else part
             for part in sums
@@ -136,6 +137,20 @@ class Sums:
         atoms = {symbol for _, symbol in terms}
         known = all(abs(factor) == 1 and (symbol in self.inputs or symbol in self.lengths) for factor, symbol in terms)
         return known and (len(terms) > 2 or bool(atoms & set(self.lengths)))
+
+    def _is_mixed(self, value: Any) -> bool:
+        """Whether a sum is one of these and of other terms, as where a difference is added to what is a multiple of it."""
+        return bool(value.is_Add and not self._is_sum(value) and self._is_sum(self._linear(value)))
+
+    def _linear(self, value: Any) -> Any:
+        known = self.inputs | set(self.lengths)
+        return sp.Add(
+            *(term for term in value.args if abs(term.as_coeff_Mul()[0]) == 1 and term.as_coeff_Mul()[1] in known)
+        )
+
+    def _parted(self, value: Any) -> Any:
+        part = self._linear(value)
+        return self._call(part) + (value - part)
 
     def _measured(self, value: Any) -> list[tuple[Any, Any]]:
         """Lengths in a sum, with their factors."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import sympy as sp
 
+from yarnverify.symbolic.functions import SAFE
 from yarnverify.symbolic.measures import NoMeasuresError, scalar_name
 from yarnverify.symbolic.tree import ONE, PI, ZERO, Expr, Name, number
 
@@ -54,8 +55,9 @@ def scalar_tree(value: Any, order: Order = by_index) -> Expr:
         if value.exp.is_Integer:
             return Expr("pow", (scalar_tree(value.base, order),), int(value.exp))
     name = type(value).__name__
-    if isinstance(value, sp.sin | sp.cos | sp.tan | sp.log) or name == "exponential":
-        return Expr("call", (scalar_tree(value.args[0], order),), "exp" if name == "exponential" else name)
+    if isinstance(value, sp.sin | sp.cos | sp.tan | sp.log) or name in ("exponential", *SAFE):
+        args = tuple(scalar_tree(arg, order) for arg in value.args)
+        return Expr("call", args, "exp" if name == "exponential" else name)
     if isinstance(value, sp.sign):
         return scalar_tree(value.args[0], order) / Expr("abs", (scalar_tree(value.args[0], order),))
     if isinstance(value, sp.Abs):

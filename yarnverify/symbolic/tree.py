@@ -7,10 +7,12 @@ The order of factors is kept, because vectors, covectors (rows) and 3x3 matrices
 from __future__ import annotations
 
 import keyword
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from fractions import Fraction
+from numbers import Real
 from typing import Any
 
 
@@ -50,6 +52,10 @@ class Name:
         return replace(self, sub=sub)
 
 
+class FormulaError(TypeError):
+    """What a formula cannot be made of; the message says what to write."""
+
+
 @dataclass(frozen=True, slots=True)
 class Inequality:
     """``left > right``, as a declared domain states it."""
@@ -58,7 +64,7 @@ class Inequality:
     right: Expr
 
     def __bool__(self) -> bool:
-        raise TypeError(
+        raise FormulaError(
             "write a chain such as a > b > c, or a and b, as a list: [a > b, b > c]; in place of if, max and min in a formula, "
             'give @energy(domain=..., elsewhere="zero"): where it acts, and nothing elsewhere'
         )
@@ -120,7 +126,9 @@ class Expr:
 
     def __pow__(self, exponent: int) -> Expr:
         if not isinstance(exponent, int):
-            raise TypeError(f"exponent must be an integer, not {exponent!r}; write sqrt(...) for a root")
+            instead = "exp(p * log(a)) for another power" if isinstance(exponent, Expr) else "sqrt(...) for a root"
+            given = "a formula" if isinstance(exponent, Expr) else repr(exponent)
+            raise FormulaError(f"an exponent must be an integer, not {given}; write {instead}")
         return Expr("pow", (self,), exponent)
 
     def __neg__(self) -> Expr:
@@ -151,8 +159,32 @@ def as_expr(value: Expr | int | Fraction) -> Expr:
         return value
     if isinstance(value, int | Fraction) and not isinstance(value, bool):
         return number(value)
-    raise TypeError(
-        f"{value!r} cannot stand in a formula: use integers and fractions.Fraction, which are exact, as in k / 2"
+    raise FormulaError(f"{_shown(value)} cannot stand in a formula, {_instead(value)}")
+
+
+def _shown(value: Any) -> str:
+    return repr(float(value)) if isinstance(value, Real) and not isinstance(value, bool) else repr(value)
+
+
+def _instead(value: Any) -> str:
+    """What to write for something that is no exact number."""
+    if isinstance(value, list | tuple):
+        return 'which has no constant vectors: make it a parameter e: Vector["1"]'
+    if not isinstance(value, Real) or isinstance(value, bool) or not math.isfinite(value):
+        return "which is made of its arguments and of exact numbers, integers and fractions"
+    if abs(value) == math.pi:
+        return "whose numbers are exact: write PI"
+    exact = Fraction(repr(float(value)))
+    near = exact.limit_denominator(1000)
+    if float(near) != value:
+        return f'whose numbers are exact: write Fraction("{float(value)!r}") of the module fractions'
+    if near.denominator == 1:
+        return f"whose numbers are exact: write {near}"
+    times = "k" if near.numerator == 1 else f"{near.numerator} * k"
+    fraction = f"Fraction({near.numerator}, {near.denominator})"
+    return (
+        f"whose numbers are exact: write {times} / {near.denominator} for {float(value)!r} * k, "
+        f"or {fraction} of the module fractions"
     )
 
 
