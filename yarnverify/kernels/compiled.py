@@ -200,6 +200,8 @@ class Loops:
         return self._margins(given)[0]
 
     def again(self) -> bool:
+        if not self._batch.tame(self._batch.rows):
+            return False
         found = self._by_first(*self._whole)
         if found != MIXED:
             return found == USUAL
