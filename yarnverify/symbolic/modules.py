@@ -165,7 +165,6 @@ def module_text(
     units = f"{energy.unit}, {energy.unit}/m and {energy.unit}/m^2"
     vector, three = f"({len(dofs)}, n)", "tuple[Array, Array, Array]"
     labels = [label.replace(".", "") for label in dofs]
-    angles_alone = any("corner" in line for line in code.splitlines()) and "segment" not in code
     values = {
         "energy": energy,
         "title": _title(energy),
@@ -179,19 +178,15 @@ def module_text(
         "parameters": _tuple(names),
         "names": names,
         "scalars": [
-            (str(symbol), parameter.positive, length_power(parameter.unit))
+            (str(symbol), parameter.positive)
             for parameter in energy.parameters
             for symbol in given_symbols(parameter.name)
         ],
         "vectors": _tuple(identifier(p.name) for p in energy.parameters if p.name.bold),
-        "velocities": _tuple(
-            n.label for n, unit in zip(energy.unknowns, energy.units, strict=True) if n.bold and unit != "m"
-        ),
         "row_units": row_units(energy),
         "rows": len(dofs),
         "unpack": ", ".join(labels) + ("," if len(labels) == 1 else ""),
         "functions": functions,
-        "scaling": "points" if angles_alone else "lengths",
         "portable": not LIBRARY & set(tape),
         "promise": promise(variant, found, LIBRARY & set(tape)),
         "numbers": numbers(variant, found),

@@ -215,7 +215,7 @@ KERNEL = runtime.Kernel(
     name="bending",
     dofs=DOFS,
     parameters=(
-        ("k_b", True, 2),
+        ("k_b", True),
     ),
     shapes=(
         runtime.Shape(
@@ -228,7 +228,6 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="lengths",
     portable=False,
     numbers="float",
 )

@@ -133,7 +133,7 @@ KERNEL = runtime.Kernel(
     name="kinetic",
     dofs=DOFS,
     parameters=(
-        ("rho", True, -2),
+        ("rho", True),
     ),
     shapes=(
         runtime.Shape(
@@ -143,8 +143,6 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    velocities=("v0", "v1"),
-    scaling="lengths",
     portable=True,
     numbers="float",
 )

@@ -277,7 +277,7 @@ KERNEL = runtime.Kernel(
     name="bending",
     dofs=DOFS,
     parameters=(
-        ("k_b", True, 2),
+        ("k_b", True),
     ),
     shapes=(
         runtime.Shape(
@@ -290,7 +290,6 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="lengths",
     portable=False,
     numbers="float",
 )
