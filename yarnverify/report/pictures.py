@@ -250,7 +250,7 @@ def _names_beside(
     (left, bottom), (right, top) = axes.transAxes.transform([(0, 0), (1, 1)]) * scale
     ends = [(in_points(a), in_points(b)) for a, b in lines]
     there = {name: in_points(spot) for name, spot in spots.items()}
-    lead = {"arrowstyle": "-", "color": "0.35", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
+    lead = {"arrowstyle": "-", "color": "0.4", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
     for name, (shift, led) in places(named, there, ends, (left, bottom, right, top)).items():
         axes.annotate(
             name, spots[name], xytext=shift, textcoords="offset points", ha="center", va="center",
