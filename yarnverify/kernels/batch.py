@@ -81,7 +81,7 @@ class Batch:
         self.dtype = self.rows.dtype
         self.values = parameters_of(kernel, parameters, self.n, self.dtype)
         self.limit = _MODERATE[self.dtype]
-        self.watch = any(not _moderate(value, self.limit) for value in self.values)
+        self.watch = any(not _moderate(value, self.limit).all() for value in self.values)
         self.threads, self.engine = threads, engine
         dof, n = self.dof, self.n
         self._scalars = {"E": 1, "G": dof, "H": dof * (dof + 1) // 2}
@@ -265,6 +265,9 @@ class Batch:
             for target in targets[1:]:
                 strange |= ~np.isfinite(target)
             strange |= ~((margins > low) & (margins < self.limit)).all(axis=0)
+            for (_, _, power), value in zip(self.kernel.parameters, self.values_at(where), strict=True):
+                if power:  # a length, or made of lengths
+                    strange |= ~_moderate(value, self.limit)
             return np.asarray(strange) if strange.any() else None
         if self.within(margins):
             return None
@@ -366,6 +369,6 @@ def _groups(found: list[Array]) -> list[Array]:
     return [every[i : i + CHUNK] for i in range(0, every.size, CHUNK)]
 
 
-def _moderate(value: Any, limit: float) -> bool:
+def _moderate(value: Any, limit: float) -> Any:
     size = np.abs(value)
-    return bool(((size == 0) | ((size > 1 / limit) & (size < limit))).all())
+    return (size == 0) | ((size > 1 / limit) & (size < limit))

@@ -72,14 +72,17 @@ class Kernel:
     name, dofs
         The energy, and the names of the rows of ``q``.
     parameters
-        Name, whether it must not be negative, and its power of length (scaling all lengths scales it so); of a vector the
+        Name, whether it must not be negative, and the power of a factor of all lengths that it is scaled by; of a vector the
         name of each component, such as ``g_x``.
     vectors, velocities
         Names of the parameters with three components, and of the unknowns that are velocities of points.
     shapes
         The forms; where the first has a choice and is not the right one, the second is, or the energy is zero if there is none.
     scaling
-        Which rows a change of scale touches: ``points`` for an energy of angles alone, else ``lengths``.
+        Which rows a change of scale touches: ``points`` for an energy of angles alone, else ``lengths``; ``none`` where nothing is
+        done for extreme sizes.
+    power
+        The power of a factor of all lengths that the energy is scaled by, where lengths are scaled.
     portable
         Whether only correctly rounded operations are used, so that bits are the same everywhere.
     numbers
@@ -96,7 +99,8 @@ class Kernel:
     shapes: tuple[Shape, ...]
     vectors: tuple[str, ...] = ()
     velocities: tuple[str, ...] = ()
-    scaling: Literal["points", "lengths"] = "lengths"
+    scaling: Literal["points", "lengths", "none"] = "lengths"
+    power: int = 1
     portable: bool = True
     numbers: Literal["float", "words", "double-double"] = "float"
     promise: Literal["units", "condition", "none"] = "units"

@@ -25,7 +25,7 @@ def exponents(kernel: Kernel, rows: Array, limit: float) -> Array:
     limit
         Lengths between its inverse and itself are moderate.
     """
-    if not kernel.points or not kernel.portable:
+    if not kernel.points or kernel.scaling == "none":
         return np.zeros(rows.shape[1], int)
     points = rows[list(kernel.points)].reshape(-1, 3, rows.shape[1])
     if len(points) < 2:  # no edge that could give the scale
@@ -54,11 +54,11 @@ def scaled(kernel: Kernel, rows: Array, values: list[Any], exponent: Array) -> t
 
 
 def unscale(kernel: Kernel, wanted: str, found: Array, exponent: Array) -> None:
-    """Energies scale like a length where all lengths were scaled, and not at all where only points were."""
+    """Energies scale by their power of length where all lengths were scaled, and not at all where only points were."""
     if not exponent.any():
         return
     dof, touched = len(kernel.dofs), set(_touched(kernel))
-    whole = int(kernel.scaling == "lengths")
+    whole = kernel.power if kernel.scaling == "lengths" else 0
     powers = {
         "E": [whole],
         "G": [whole - (i in touched) for i in range(dof)],

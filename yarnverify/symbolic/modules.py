@@ -12,7 +12,7 @@ from yarnverify.errors import NotRunError
 from yarnverify.source import load
 from yarnverify.symbolic.angles import prove_derivatives, prove_recurrence, turning_series
 from yarnverify.symbolic.declare import Energy, load_declarations
-from yarnverify.symbolic.dimensions import dimension_of_unit
+from yarnverify.symbolic.dimensions import scaling_powers
 from yarnverify.symbolic.emit import dof_labels, given_symbols, identifier
 from yarnverify.symbolic.printing import LIBRARY, TEMPLATES, statements, text_of, used_functions
 from yarnverify.symbolic.programs import (
@@ -108,7 +108,7 @@ def kernel_modules(
                 programs, notes = derived_programs(energy, derived, variant)
             if variant == "reference" and (called := library_calls(programs)):
                 missing.append(
-                    f"{energy.name}: no variant in twice the digits: there is no {' and no '.join(called)} in these"
+                    f"{energy.name}: no variant in twice the digits: its numbers have no {' and no '.join(called)}"
                 )
                 continue
             sources = [energy.file, *([document] if variant == "printed" else [])]
@@ -166,6 +166,9 @@ def module_text(
     vector, three = f"({len(dofs)}, n)", "tuple[Array, Array, Array]"
     labels = [label.replace(".", "") for label in dofs]
     angles_alone = any("corner" in line for line in code.splitlines()) and "segment" not in code
+    whole, powers = scaling_powers(energy)
+    calls = set(library_calls(programs))
+    bare = variant in ("differentiated", "printed") and calls  # as a person would print it
     values = {
         "energy": energy,
         "title": _title(energy),
@@ -179,7 +182,7 @@ def module_text(
         "parameters": _tuple(names),
         "names": names,
         "scalars": [
-            (str(symbol), parameter.positive, length_power(parameter.unit))
+            (str(symbol), parameter.positive, powers[parameter.label])
             for parameter in energy.parameters
             for symbol in given_symbols(parameter.name)
         ],
@@ -191,7 +194,8 @@ def module_text(
         "rows": len(dofs),
         "unpack": ", ".join(labels) + ("," if len(labels) == 1 else ""),
         "functions": functions,
-        "scaling": "points" if angles_alone else "lengths",
+        "scaling": "none" if bare else "points" if angles_alone else "lengths",
+        "power": 1 if angles_alone else whole,
         "portable": not LIBRARY & set(tape),
         "promise": promise(variant, found, LIBRARY & set(tape)),
         "numbers": numbers(variant, found),
@@ -231,12 +235,6 @@ def _operations(text: str, name: str) -> dict[str, dict[str, int]]:
         }
         for i, shape in enumerate(kernel.shapes)
     }
-
-
-def length_power(unit: str) -> int:
-    """The power of length in a unit such as ``N m^2``; newton and second are the other base units, so that kg is N s^2 m^-1."""
-    mass, length, _ = dimension_of_unit(unit)
-    return int(length - mass)
 
 
 def row_units(energy: Energy) -> str:

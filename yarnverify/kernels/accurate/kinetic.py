@@ -134,7 +134,7 @@ KERNEL = runtime.Kernel(
     name="kinetic",
     dofs=DOFS,
     parameters=(
-        ("rho", True, -2),
+        ("rho", True, 0),
     ),
     shapes=(
         runtime.Shape(
@@ -146,6 +146,7 @@ KERNEL = runtime.Kernel(
     ),
     velocities=("v0", "v1"),
     scaling="lengths",
+    power=3,
     portable=True,
     numbers="words",
     promise="condition",

@@ -56,7 +56,7 @@ KERNEL = runtime.Kernel(
     name="plane",
     dofs=DOFS,
     parameters=(
-        ("k", True, -2),
+        ("k", True, 0),
         ("n_x", False, 0),
         ("n_y", False, 0),
         ("n_z", False, 0),
@@ -74,6 +74,7 @@ KERNEL = runtime.Kernel(
     ),
     vectors=("n", "p"),
     scaling="lengths",
+    power=3,
     portable=True,
     numbers="words",
 )

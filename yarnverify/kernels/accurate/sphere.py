@@ -76,7 +76,7 @@ KERNEL = runtime.Kernel(
     name="sphere",
     dofs=DOFS,
     parameters=(
-        ("k", True, -2),
+        ("k", True, 0),
         ("c_x", False, 1),
         ("c_y", False, 1),
         ("c_z", False, 1),
@@ -92,6 +92,7 @@ KERNEL = runtime.Kernel(
     ),
     vectors=("c",),
     scaling="lengths",
+    power=3,
     portable=True,
     numbers="float",
 )

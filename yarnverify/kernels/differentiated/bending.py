@@ -215,7 +215,7 @@ KERNEL = runtime.Kernel(
     name="bending",
     dofs=DOFS,
     parameters=(
-        ("k_b", True, 2),
+        ("k_b", True, 0),
     ),
     shapes=(
         runtime.Shape(
@@ -228,7 +228,8 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="lengths",
+    scaling="none",
+    power=-1,
     portable=False,
     numbers="float",
 )

@@ -203,7 +203,7 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="lengths",
+    scaling="none",
     portable=False,
     numbers="float",
 )

@@ -450,7 +450,7 @@ KERNEL = runtime.Kernel(
     name="bending",
     dofs=DOFS,
     parameters=(
-        ("k_b", True, 2),
+        ("k_b", True, 0),
     ),
     shapes=(
         runtime.Shape(

@@ -62,7 +62,7 @@ KERNEL = runtime.Kernel(
     name="gravity",
     dofs=DOFS,
     parameters=(
-        ("rho", True, -2),
+        ("rho", True, 0),
         ("g_x", False, 1),
         ("g_y", False, 1),
         ("g_z", False, 1),
@@ -77,6 +77,7 @@ KERNEL = runtime.Kernel(
     ),
     vectors=("g",),
     scaling="lengths",
+    power=3,
     portable=True,
     numbers="float",
 )

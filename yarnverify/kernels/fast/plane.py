@@ -55,7 +55,7 @@ KERNEL = runtime.Kernel(
     name="plane",
     dofs=DOFS,
     parameters=(
-        ("k", True, -2),
+        ("k", True, 0),
         ("n_x", False, 0),
         ("n_y", False, 0),
         ("n_z", False, 0),
@@ -73,6 +73,7 @@ KERNEL = runtime.Kernel(
     ),
     vectors=("n", "p"),
     scaling="lengths",
+    power=3,
     portable=True,
     numbers="float",
 )

@@ -277,7 +277,7 @@ KERNEL = runtime.Kernel(
     name="bending",
     dofs=DOFS,
     parameters=(
-        ("k_b", True, 2),
+        ("k_b", True, 0),
     ),
     shapes=(
         runtime.Shape(
@@ -290,7 +290,8 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="lengths",
+    scaling="none",
+    power=-1,
     portable=False,
     numbers="float",
 )

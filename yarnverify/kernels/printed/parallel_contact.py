@@ -54,7 +54,7 @@ KERNEL = runtime.Kernel(
     name="parallel_contact",
     dofs=DOFS,
     parameters=(
-        ("k_c", True, -2),
+        ("k_c", True, 0),
         ("L", True, 1),
         ("d", True, 1),
     ),
@@ -66,6 +66,7 @@ KERNEL = runtime.Kernel(
         ),
     ),
     scaling="lengths",
+    power=3,
     portable=True,
     numbers="float",
 )

@@ -252,7 +252,7 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="lengths",
+    scaling="none",
     portable=False,
     numbers="float",
 )
