@@ -79,8 +79,8 @@ class Kernel:
     shapes
         The forms; where the first has a choice and is not the right one, the second is, or the energy is zero if there is none.
     scaling
-        Which rows a change of scale touches: ``points`` for an energy of angles alone, else ``lengths``; ``none`` where nothing is
-        done for extreme sizes.
+        Which rows a change of scale touches: ``points`` for an energy of angles alone, else ``lengths``; ``none`` where
+        nothing is done for extreme sizes.
     power
         The power of a factor of all lengths that the energy is scaled by, where lengths are scaled.
     portable

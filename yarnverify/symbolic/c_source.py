@@ -13,10 +13,10 @@ from sympy.printing.c import C99CodePrinter
 
 from yarnverify.errors import InputError
 from yarnverify.symbolic.c_functions import Functions, flat, rebuilt
-from yarnverify.symbolic.dimensions import scaling_powers
 from yarnverify.symbolic.declare import Energy, load_declarations
+from yarnverify.symbolic.dimensions import scaling_powers
 from yarnverify.symbolic.emit import dof_labels, given_symbols
-from yarnverify.symbolic.printing import LIBRARY, TEMPLATES, statements
+from yarnverify.symbolic.printing import TEMPLATES, statements
 from yarnverify.symbolic.programs import derived_programs, proved
 from yarnverify.symbolic.reading import UnsupportedError
 from yarnverify.symbolic.steps import Program

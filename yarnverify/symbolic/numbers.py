@@ -156,7 +156,7 @@ class Balls:
         return low.acos().union(high.acos())
 
     def atan2(self, y: Number, x: Number) -> Number:
-        return y.atan2(x)
+        return flint.arb.atan2(y, x)
 
     def circle(self, angle: Number) -> tuple[Number, Number]:
         return angle.sin(), angle.cos()

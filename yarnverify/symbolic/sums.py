@@ -197,7 +197,7 @@ class Exact:
         return self(plain.value(self._stages.energy.expression))
 
     def expression(self, value: Any) -> Any:
-        """A quotient of polynomials, in factors; the value as it is where its polynomials have more terms than it has operations.
+        """A quotient of polynomials, in factors; the value as it is where these have more terms than it has operations.
 
         What is opened to so many terms is no shorter in factors but by chance, and to find these takes minutes.
         """
