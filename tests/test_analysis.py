@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from yarnverify import cli
+from tests.commands import caller
 from yarnverify.analysis.command import analysis, scene_modes
 from yarnverify.analysis.cotton import Cotton, cotton
 from yarnverify.analysis.moduli import compliance, moduli, stiffness
@@ -280,11 +280,8 @@ def test_modes_of_a_scene() -> None:
 def test_errors_are_one_line(
     tokens: list[str], message: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("sys.argv", ["yarnverify", "analyse", *tokens])
-    with pytest.raises(SystemExit) as stopped:
-        cli.main()
-    shown = capsys.readouterr().err
-    assert stopped.value.code == 2
+    status, _, shown = caller(monkeypatch, capsys)("analyse", *tokens)
+    assert status == 2
     assert message in shown and len(shown.splitlines()) == 1
 
 

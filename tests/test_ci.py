@@ -12,6 +12,7 @@ from xml.etree.ElementTree import fromstring
 import pytest
 import yaml
 
+from tests.commands import status_of
 from tests.pages import records
 from yarnverify import ci, cli
 from yarnverify.errors import NotRunError
@@ -137,10 +138,7 @@ def test_report_writes_what_was_asked_for(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def run(tokens: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
-    monkeypatch.setattr("sys.argv", ["yarnverify", *tokens])
-    with pytest.raises(SystemExit) as stopped:
-        cli.main()
-    return int(stopped.value.code or 0)
+    return status_of(monkeypatch, *tokens)
 
 
 # -- snippets ---------------------------------------------------------------------------------------------------------

@@ -183,6 +183,8 @@ def test_conjugate_gradients_notice_what_they_cannot_do() -> None:
         ConjugateGradients(lines).factorise(sparse.csc_array(matrix - 3 * shift)).solve(np.ones(made.count))
     with pytest.raises(LinearSolveError, match="after 4 iterations"):
         ConjugateGradients(lines, iterations=3).factorise(matrix).solve(np.ones(made.count))
+    with pytest.raises(LinearSolveError, match="residual nan"):
+        ConjugateGradients(lines).factorise(matrix).solve(np.where(np.arange(made.count) == 3, np.nan, 1.0))
     matrix.data[5] = np.nan
     with pytest.raises(LinearSolveError):
         ConjugateGradients(lines).factorise(matrix).solve(np.ones(made.count))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from yarnverify import cli
+from tests.commands import caller
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.simulation import command
 from yarnverify.simulation.study import Keeping, study
@@ -250,12 +250,9 @@ def test_one_clear_error(
     monkeypatch.chdir(tmp_path)
     for name, text in (("bad", "x = 1\ndef"), ("raising", "x = 1\n1 / 0"), ("empty", ""), ("file", "")):
         Path(f"{name}.{'txt' if name == 'file' else 'py'}").write_text(text, encoding="utf-8")
-    monkeypatch.setattr(sys, "argv", ["yarnverify", "simulate", *arguments])
-    with pytest.raises(SystemExit) as ended:
-        cli.main()
-    shown = capsys.readouterr()
-    assert ended.value.code == status and message in shown.err, shown.err
-    assert shown.err.count("\n") == 1 and not shown.out
+    ended, out, err = caller(monkeypatch, capsys)("simulate", *arguments)
+    assert ended == status and message in err, err
+    assert err.count("\n") == 1 and not out
 
 
 def test_yarns_too_stiff_for_their_coordinates_are_refused() -> None:
@@ -271,20 +268,17 @@ def test_missed_goals_are_exit_status_1(
     swing: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     swing.write_text(STAGED.replace("common = dict(", "common = dict(known=[Known('x', 'm', 1.0, lambda end: 2.0)], "))
-    monkeypatch.setattr(sys, "argv", ["yarnverify", "simulate", str(swing), "--set", "steps=2", "rest=yes"])
-    with pytest.raises(SystemExit) as ended:
-        cli.main()
-    assert ended.value.code == 1
-    assert "swing, direct, size 3: x has the error 1.0e+00, and 1e-12 is allowed" in capsys.readouterr().out
+    status, out, _ = caller(monkeypatch, capsys)("simulate", str(swing), "--set", "steps=2", "rest=yes")
+    assert status == 1
+    assert "swing, direct, size 3: x has the error 1.0e+00, and 1e-12 is allowed" in out
 
 
 def test_scenes_are_listed(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     from yarnverify.simulation.scenes import SCENES
 
-    monkeypatch.setattr(sys, "argv", ["yarnverify", "simulate"])
-    with pytest.raises(SystemExit, match="0"):
-        cli.main()
-    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == [scene.name for scene in SCENES]
+    status, out, _ = caller(monkeypatch, capsys)("simulate")
+    assert status == 0
+    assert [line.split()[0] for line in out.splitlines()] == [scene.name for scene in SCENES]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of processes")

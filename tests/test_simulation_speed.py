@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.commands import caller
 from yarnverify.benchmark.show import show_benchmark
 from yarnverify.benchmark.simulation import cantilever, memory, run
 from yarnverify.benchmark.simulation.cantilever import Solve, error, least, ours
 from yarnverify.benchmark.simulation.cloth import PARTS, STEP, Cloth
 from yarnverify.benchmark.simulation.run import benchmark_simulation
-from yarnverify.cli import main
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.report.pages import pages
 from yarnverify.report.simulation_speed import milliseconds, speed_tables
@@ -190,11 +190,9 @@ def test_the_picture_is_drawn(record: dict[str, Any], tmp_path: Path) -> None:
 def test_options_out_of_range_are_refused_in_one_line(
     options: list[str], message: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(sys, "argv", ["yarnverify", "benchmark", "simulation", *options])
-    with pytest.raises(SystemExit) as stopped:
-        main()
-    assert stopped.value.code == 2
-    assert capsys.readouterr().err.strip().splitlines()[-1] == message
+    status, _, err = caller(monkeypatch, capsys)("benchmark", "simulation", *options)
+    assert status == 2
+    assert err.strip().splitlines()[-1] == message
 
 
 def test_a_named_peer_that_is_missing_is_exit_status_3(
@@ -205,11 +203,9 @@ def test_a_named_peer_that_is_missing_is_exit_status_3(
     monkeypatch.setattr(run, "peak", lambda side, solver: 1.0)
     target = tmp_path / "speed.json"
     options = ["--sizes", "9", "--peers", "elastica", "--rounds", "1", "--json", str(target)]
-    monkeypatch.setattr(sys, "argv", ["yarnverify", "benchmark", "simulation", *options])
-    with pytest.raises(SystemExit) as stopped:
-        main()
-    assert stopped.value.code == 3
-    assert "elastica: not run: elastica is not installed" in capsys.readouterr().err
+    status, _, err = caller(monkeypatch, capsys)("benchmark", "simulation", *options)
+    assert status == 3
+    assert "elastica: not run: elastica is not installed" in err
     assert (
         json.loads(target.read_text())["command"]
         == "yarnverify benchmark simulation --sizes 9 --peers elastica --rounds 1"

@@ -124,17 +124,17 @@ def test_a_disk_that_is_full_leaves_the_older_state(tmp_path: Path) -> None:
     """
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
     first, second = done.stdout.splitlines()
-    assert first.startswith("the state could not be saved to run.npz: ") and second == "10"
+    assert first.startswith("run.npz: cannot write: ") and second == "10"
     assert os.listdir(tmp_path) == ["run.npz"]
 
 
-def test_a_folder_that_is_missing_or_locked(tmp_path: Path) -> None:
-    with pytest.raises(NotRunError, match=r"could not be saved to .*nowhere"):
-        save(tmp_path / "nowhere" / "run.npz", **ARRAYS)
+def test_a_folder_that_is_none_and_one_in_place_of_the_file(tmp_path: Path) -> None:
     (tmp_path / "run.npz").mkdir()
-    with pytest.raises(NotRunError, match="could not be saved"):
-        save(tmp_path / "run.npz", **ARRAYS)
-    assert os.listdir(tmp_path) == ["run.npz"]
+    (tmp_path / "taken").write_text("")
+    for path in (tmp_path / "run.npz", tmp_path / "taken" / "run.npz"):
+        with pytest.raises(NotRunError, match=f"{path}: cannot write: "):
+            save(path, **ARRAYS)
+    assert sorted(os.listdir(tmp_path)) == ["run.npz", "taken"]
 
 
 def test_an_interruption_while_writing_leaves_the_older_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

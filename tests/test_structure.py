@@ -47,7 +47,7 @@ RULES = [
             "yarnverify.simulation",
         ),
     ),
-    ("kernels", ("numpy", "yarnverify.kernels")),
+    ("kernels", ("numpy", "yarnverify.files", "yarnverify.kernels")),
     ("report", ("jinja2", "markupsafe", "latex2mathml", "matplotlib", "yarnverify.report")),
     (
         "simulation/view",

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Files that are there whole or not at all. The standard library alone."""
 
 from __future__ import annotations
 
@@ -28,11 +28,22 @@ def whole(path: Path) -> Iterator[Path]:
         with part.open("rb") as written:
             os.fsync(written.fileno())
         os.replace(part, path)
+        _sync(path.parent)
     except OSError as error:
         raise NotRunError(f"{path}: cannot write: {why(error)}") from error
     finally:
         with suppress(OSError):  # such as a folder that is none
             part.unlink(missing_ok=True)
+
+
+def _sync(folder: Path) -> None:
+    """Make the new name last as well, where folders can be synchronised."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def write_text(text: str, path: Path) -> None:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.accuracy.conditioning import condition, hessian_condition
+from yarnverify.accuracy.conditioning import Conditions
 from yarnverify.accuracy.metrics import OUTPUTS, Errors, measure, slices
 from yarnverify.accuracy.regimes import curve_points, points_of, regimes
 from yarnverify.accuracy.rule import EXACT, allowed
@@ -144,25 +144,6 @@ def compute(module: Any, points: Points, exact: Truth, dtype: str) -> tuple[dict
     return {"E": e, "G": g, "H": h}, invented
 
 
-class _Conditions:
-    """Condition numbers of one unit, worked out when asked for."""
-
-    def __init__(self, energy: Energy, points: Points, exact: Truth) -> None:
-        self.energy, self.points, self.exact = energy, points, exact
-        self._known: dict[Any, Array] = {}
-
-    def at(self, output: str, point: int, draws: int = 0) -> Array:
-        """(blocks,) of one point."""
-        if output != "H":
-            if output not in self._known:
-                self._known[output] = condition(output, self.energy, self.points, self.exact)
-            return self._known[output][:, point]
-        key = (point, draws)
-        if key not in self._known:
-            self._known[key] = hessian_condition(self.energy, self.points, self.exact, point, draws)
-        return self._known[key]
-
-
 def limits(variant: str, dtype: str, promise: str = "units") -> str | None:
     """Which target a variant has: "accurate", "fast", "reference", or none; one that promises less is held to less."""
     if dtype != "float64" or variant not in ("accurate", "fast", "reference") or promise == "none":
@@ -170,7 +151,7 @@ def limits(variant: str, dtype: str, promise: str = "units") -> str | None:
     return "fast" if promise == "condition" else variant
 
 
-def _share(target: str, output: str, errors: Errors, conditions: _Conditions) -> tuple[float, int]:
+def _share(target: str, output: str, errors: Errors, conditions: Conditions) -> tuple[float, int]:
     """The largest error as a share of what the target allows, and where; above 1 the target is missed."""
     each = errors.componentwise if target == "reference" else errors.normwise
     known = np.where(np.isnan(each), -1.0, each)
@@ -218,7 +199,7 @@ def run_unit(unit: Unit) -> dict[str, Any]:
 def _curve(energy: Energy, unit: Unit) -> dict[str, Any]:
     distances, points = curve_points(energy, unit.regime, unit.count, unit.seed)
     exact = truth(energy, points)
-    conditions = _Conditions(energy, points, exact)
+    conditions = Conditions(energy, points, exact)
     shape = (len(distances), unit.count)
 
     def worst(values: Array) -> list[float | str | None]:
@@ -251,7 +232,7 @@ def _curve(energy: Energy, unit: Unit) -> dict[str, Any]:
 def cells(energy: Energy, points: Points, unit: Unit) -> list[dict[str, Any]]:
     """The cells of a unit at given points."""
     exact = truth(energy, points)
-    conditions = _Conditions(energy, points, exact)
+    conditions = Conditions(energy, points, exact)
     gone = _zero_length(energy, points)
     found = []
     for variant in unit.variants:
@@ -296,7 +277,7 @@ def _zero_length(energy: Energy, points: Points) -> Array:
 
 
 def _summary(
-    output: str, errors: Errors, conditions: _Conditions, target: str | None, key: tuple[str, str, str], points: Points
+    output: str, errors: Errors, conditions: Conditions, target: str | None, key: tuple[str, str, str], points: Points
 ) -> dict[str, Any]:
     worst = errors.worst_block
     known = worst[~np.isnan(worst)]
@@ -342,7 +323,7 @@ def label(error: float, amplification: float | None) -> str:
     return "conditioning" if error <= allowed(amplification) else "computation"
 
 
-def _spread(conditions: _Conditions, exact: Truth) -> dict[str, Any]:
+def _spread(conditions: Conditions, exact: Truth) -> dict[str, Any]:
     """Median and largest condition number of each output, over all points."""
     found = {}
     for output in OUTPUTS:

@@ -94,6 +94,24 @@ def hessian_condition(energy: Energy, points: Points, truth: Truth, at: int, dra
     return np.array(found)
 
 
+class Conditions:
+    """Condition numbers at some points, each worked out when it is asked for."""
+
+    def __init__(self, energy: Energy, points: Points, truth: Truth) -> None:
+        self._energy, self._points, self._truth = energy, points, truth
+        self._known: dict[Any, Array] = {}
+
+    def at(self, output: str, point: int, draws: int = 0) -> Array:
+        """(blocks,) of one output at one point; ``draws`` as in ``hessian_condition``, of no concern to the others."""
+        if output == "H":
+            if (point, draws) not in self._known:
+                self._known[point, draws] = hessian_condition(self._energy, self._points, self._truth, point, draws)
+            return self._known[point, draws]
+        if output not in self._known:
+            self._known[output] = condition(output, self._energy, self._points, self._truth)
+        return self._known[output][:, point]
+
+
 def _change(
     reduced: Reduced,
     values: Sequence[float],

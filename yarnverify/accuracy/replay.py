@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from yarnverify.accuracy.cells import compute, declared_energy, kernel, label, significant
-from yarnverify.accuracy.conditioning import condition, hessian_condition
+from yarnverify.accuracy.conditioning import Conditions
 from yarnverify.accuracy.forms import rows_of
 from yarnverify.accuracy.metrics import OUTPUTS, UNIT, blocks_of, measure, true_parts
 from yarnverify.accuracy.truth import Points, truth
@@ -65,15 +65,12 @@ def replay(text: str, folder: Path, kernels: str = "") -> dict[str, Any]:
     exact = truth(energy, points)
     computed, _ = compute(kernel(variant, energy.name, kernels), points, exact, dtype)
     rows = []
+    conditions = Conditions(energy, points, exact)
     for output in OUTPUTS:
         errors = measure(output, computed[output], exact, energy.unknowns, dtype)
-        if output == "H":
-            conditions = hessian_condition(energy, points, exact, 0)
-        else:
-            conditions = condition(output, energy, points, exact)[:, 0]
         high, _ = true_parts(exact, output)
         for at, (name, place) in enumerate(blocks_of(output, energy.unknowns)):
-            error, amplification = float(errors.normwise[at, 0]), float(conditions[at])
+            error, amplification = float(errors.normwise[at, 0]), float(conditions.at(output, 0)[at])
             rows.append(
                 {
                     "output": output,

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.accuracy.conditioning import condition, hessian_condition
+from yarnverify.accuracy.conditioning import Conditions
 from yarnverify.accuracy.metrics import UNIT, blocks_of, slices
 from yarnverify.accuracy.regimes import points_of, regimes, vector_parameters
 from yarnverify.accuracy.rule import AMPLIFIED
@@ -47,7 +47,6 @@ class Cases:
     truth: Truth
     tags: tuple[str, ...]
     dtype: str
-    _known: dict[Any, Array] = field(default_factory=dict, compare=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -100,40 +99,35 @@ class Cases:
 
     def condition(self, kind: str, block: str, at: int, draws: int = 0) -> float:
         """Condition number of a block at a state; with ``draws`` a bound from below, which is cheaper for a Hessian."""
-        if kind == "H" and self._jumps()[at]:
+        if kind == "H" and self._jumps[at]:
             return float("inf")
         names = [name for name, _ in blocks_of(kind, self.energy.unknowns)]
         if kind == "H" and block not in names:
             block = ",".join(reversed(block.split(",")))
-        if kind == "H":
-            key: Any = (kind, at, draws)
-            if key not in self._known:
-                self._known[key] = hessian_condition(self.energy, self.points, self.truth, at, draws)
-            column = self._known[key]
-        else:
-            if kind not in self._known:
-                self._known[kind] = condition(kind, self.energy, self.points, self.truth)
-            column = self._known[kind][:, at]
+        column = self._conditions.at(kind, at, draws)
         return float(np.nan_to_num(column[names.index(block)], nan=0.0, posinf=np.inf))
 
+    @cached_property
+    def _conditions(self) -> Conditions:
+        return Conditions(self.energy, self.points, self.truth)
+
+    @cached_property
     def _jumps(self) -> Array:
         """(n,) bool: whether an energy that does not act everywhere begins or ends to act within the rounding of the inputs.
 
         Its Hessian jumps there, so that its condition number is infinite, and either value is right.
         """
-        if "jumps" not in self._known:
-            found = np.zeros(len(self), bool)
-            if self.energy.elsewhere == "zero":
-                acts = (self.truth.hessian != 0).any(axis=(0, 1))
-                rows = self.points.rows()
-                for row in range(len(rows)):
-                    for change in (-1, 1):
-                        moved = rows.copy()
-                        moved[row] *= 1 + change * len(rows) * AMPLIFIED * UNIT[self.dtype]
-                        points = _from_rows(moved, self.points)
-                        found |= (truth(self.energy, points).hessian != 0).any(axis=(0, 1)) != acts
-            self._known["jumps"] = found
-        return self._known["jumps"]
+        found = np.zeros(len(self), bool)
+        if self.energy.elsewhere == "zero":
+            acts = (self.truth.hessian != 0).any(axis=(0, 1))
+            rows = self.points.rows()
+            for row in range(len(rows)):
+                for change in (-1, 1):
+                    moved = rows.copy()
+                    moved[row] *= 1 + change * len(rows) * AMPLIFIED * UNIT[self.dtype]
+                    points = _from_rows(moved, self.points)
+                    found |= (truth(self.energy, points).hessian != 0).any(axis=(0, 1)) != acts
+        return found
 
 
 @cache

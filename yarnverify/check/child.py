@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from yarnverify.check.calls import TRIED, Call, answers, flattened, guessed, load, manner
 from yarnverify.check.conventions import LAYOUTS
 from yarnverify.errors import InputError, NotRunError
+from yarnverify.files import write_record
 
 Array = NDArray[Any]
 BEGUN, DONE, RAISED = 1, 2, 3
@@ -58,9 +59,7 @@ class Task:
             return
         self.outputs = np.lib.format.open_memmap(path, mode="w+", dtype=np.float64, shape=(len(self.q), total))
         self.outputs[:] = np.nan
-        draft = self.folder / "decided.tmp"
-        draft.write_text(json.dumps(decided))
-        draft.replace(self.folder / "decided.json")
+        write_record(decided, self.folder / "decided.json")
 
 
 class _UnnamedError(ValueError):

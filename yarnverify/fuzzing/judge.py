@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.accuracy.conditioning import condition, hessian_condition
+from yarnverify.accuracy.conditioning import Conditions
 from yarnverify.accuracy.metrics import Errors, measure
 from yarnverify.accuracy.rule import AMPLIFIED, EXACT, allowed
 from yarnverify.accuracy.truth import Points, Truth, truth
@@ -178,7 +178,7 @@ def _compare(
         return [], worst
     conditions = np.zeros(len(sizes))
     if limit.conditioning:
-        conditions = np.nan_to_num(_conditions(output, energy, points, true), nan=np.inf)
+        conditions = np.nan_to_num(Conditions(energy, points, true).at(output, 0), nan=np.inf)
     flaws, worst = [], 0.0
     for block, size, number in zip(errors.blocks, sizes, conditions, strict=True):
         most = limit.allowed(float(number), str(computed.dtype))
@@ -190,10 +190,3 @@ def _compare(
             text = f"{where} is wrong by {size:.3g} u, allowed are {most:.3g} u"
             flaws.append(Flaw("error", where, text, float(size / most)))
     return flaws, worst
-
-
-def _conditions(output: str, energy: Energy, points: Points, true: Truth) -> Array:
-    """Condition numbers of the blocks."""
-    return (
-        hessian_condition(energy, points, true, 0) if output == "H" else condition(output, energy, points, true)[:, 0]
-    )

@@ -12,7 +12,8 @@
 The default variant is ``accurate``; the packages ``yarnverify.kernels.fast`` and so on hold the others, all with the same
 interface; what the document does not print (gravity, kinetic energy, obstacles) comes as ``accurate``, ``fast``, ``reference``.
 Generated modules hold straight-line formulas over ``geometry`` (safe atoms); ``batch`` runs them by way of ``tape``
-(chunks of NumPy calls), ``doubledouble`` or ``compiled`` (numba); ``words`` keeps the digits of sums without measures.
+(chunks of NumPy calls), ``doubledouble`` or ``compiled`` (numba), and the few elements of extreme size by way of ``wide``;
+``words`` keeps the digits of sums without measures.
 """
 
 from yarnverify.kernels import bending, gravity, kinetic, parallel_contact, plane, shear, sphere, stretch

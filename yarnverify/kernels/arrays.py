@@ -56,6 +56,8 @@ class Arrays:
             return False
         inputs, calls, margins, choice = self._whole
         with np.errstate(all="ignore"):
+            if not batch.tame(batch.rows):
+                return False
             np.add(batch.rows, 0.0, out=inputs)  # -0.0 is 0.0
             for function, arguments in calls:
                 function(*arguments)

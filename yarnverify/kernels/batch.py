@@ -1,7 +1,7 @@
 """One call of a kernel, from checked inputs to outputs and named errors.
 
-Nearly all elements go through the first shape a chunk at a time; the few that need something else (the second shape, a
-scale far from 1, an error) are taken out by looking at the margins and are done on their own.
+Nearly all elements go through the first shape a chunk at a time; the few that need something else (the second shape,
+numbers of any size, an error) are taken out by looking at their inputs and margins and are done on their own.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from yarnverify.kernels.inputs import (
     rows_of,
 )
 from yarnverify.kernels.memory import scratch
-from yarnverify.kernels.scaling import exponents, scaled, unscale
+from yarnverify.kernels.wide import rounded, run_wide, serves
 
 if TYPE_CHECKING:
     from yarnverify.kernels.runtime import Kernel
@@ -39,8 +39,10 @@ CHUNK = 8192  # elements at a time, so that scratch memory stays in the cache
 # Threads wait for the interpreter between any two calls of NumPy, which must be long beside that.
 _SHARED = 4 * CHUNK
 
-# Lengths, sines and parameters within these powers of two can neither overflow nor underflow in any product that occurs.
+# Lengths, sines and parameters within these powers of two, and coordinates of at most this size that are zero or at least so
+# small, can neither overflow nor underflow in any product that occurs.
 _MODERATE = {np.dtype(np.float64): 2.0**100, np.dtype(np.float32): 2.0**14}
+_SMALL = {np.dtype(np.float64): 2.0**-200, np.dtype(np.float32): 2.0**-28}
 
 Where: TypeAlias = slice | Array
 
@@ -80,8 +82,8 @@ class Batch:
         self.dof, self.n = self.rows.shape
         self.dtype = self.rows.dtype
         self.values = parameters_of(kernel, parameters, self.n, self.dtype)
-        self.limit = _MODERATE[self.dtype]
-        self.watch = any(not _moderate(value, self.limit).all() for value in self.values)
+        self.limit, self.small = _MODERATE[self.dtype], _SMALL[self.dtype]
+        self.watch = self._extreme_values()
         self.threads, self.engine = threads, engine
         dof, n = self.dof, self.n
         self._scalars = {"E": 1, "G": dof, "H": dof * (dof + 1) // 2}
@@ -94,9 +96,26 @@ class Batch:
     def again(self) -> list[Array]:
         """The outputs for what the rows hold by now, which must be the caller's own array of this kind, not a copy."""
         self.reasons.clear()
-        if self._kept is not None and self.n <= CHUNK and not self.watch and self._kept.again():
+        if self._kept is not None and self.n <= CHUNK and self.watch is None and self._kept.again():
             return self.out
         return self.results()
+
+    def _extreme_values(self) -> Array | None:
+        """(n,) whether an element has a parameter of extreme size; None if none has."""
+        found = np.zeros(self.n, bool)
+        for value in self.values:
+            size = np.abs(value)
+            found |= ~((size == 0) | ((size > 1 / self.limit) & (size < self.limit)))
+        return found if found.any() else None
+
+    def tame(self, rows: Array) -> bool:
+        """Whether no coordinate is of extreme size, infinite or NaN."""
+        size = np.abs(rows, out=scratch("sizes", self.dof, rows.shape[1], self.dtype))
+        if not size.max(initial=0) < self.limit:  # so it is with NaN
+            return False
+        bits = size.view(f"u{size.itemsize}")  # in the order of the numbers, and less 1 zero is the largest
+        bits -= bits.dtype.type(1)
+        return bool(bits.min(initial=np.iinfo(bits.dtype).max) >= self.dtype.type(self.small).view(bits.dtype) - 1)
 
     def within(self, margins: Array) -> bool:
         low, high = np.minimum.reduce(margins, None, initial=1.0), np.maximum.reduce(margins, None, initial=1.0)
@@ -183,7 +202,9 @@ class Batch:
 
     def _single(self) -> bool:
         """A batch of one; False where it needs more care."""
-        if self.watch or self.engine != "numpy":
+        if self.watch is not None or self.engine != "numpy":
+            return False
+        if not all(self.small <= abs(v) < self.limit or v == 0 for v in self.rows[:, 0].tolist()):
             return False
         found = self.one(0, 0)
         if found is None:
@@ -229,7 +250,9 @@ class Batch:
             strange: list[Array] = []
             for where in ranges:
                 margins, choice = worker.first(where)
-                odd = self._strange(margins, where)
+                odd, extreme = self._strange(margins, where), self._extreme(where)
+                if extreme is not None:
+                    odd = extreme if odd is None else odd | extreme
                 if choice.size and not np.isfinite(choice).all():
                     odd = ~np.isfinite(choice[0]) if odd is None else odd | ~np.isfinite(choice[0])
                 if odd is not None:
@@ -258,20 +281,19 @@ class Batch:
 
     def _strange(self, margins: Array, where: Where) -> Array | None:
         """Elements that are not as tame as nearly all are; None if there are none."""
-        low = 1 / self.limit
-        if self.watch or not margins.size:
-            targets = self.targets(where)
-            strange = ~np.isfinite(targets[0])
-            for target in targets[1:]:
-                strange |= ~np.isfinite(target)
-            strange |= ~((margins > low) & (margins < self.limit)).all(axis=0)
-            for (_, _, power), value in zip(self.kernel.parameters, self.values_at(where), strict=True):
-                if power:  # a length, or made of lengths
-                    strange |= ~_moderate(value, self.limit)
-            return np.asarray(strange) if strange.any() else None
+        watch = None if self.watch is None else self.watch[where]
         if self.within(margins):
+            return watch
+        strange = ~((margins > 1 / self.limit) & (margins < self.limit)).all(axis=0)
+        return np.asarray(strange if watch is None else strange | watch)
+
+    def _extreme(self, where: slice) -> Array | None:
+        """Elements with a coordinate of extreme size, infinite or NaN; None if there are none."""
+        rows = self.rows[:, where]
+        if self.tame(rows):
             return None
-        return np.asarray(~((margins > low) & (margins < self.limit)).all(axis=0))
+        size = np.abs(rows)
+        return np.asarray(~((size < self.limit) & ((size >= self.small) | (size == 0))).all(axis=0))
 
     def evaluator(self, shape: int) -> Evaluator:
         """A function that fills targets with the outputs of a shape by NumPy, and gives margins and choice as rows."""
@@ -309,32 +331,59 @@ class Batch:
         for label, row in zip(kernel.dofs, rows, strict=True):
             for text, wrong in (("nan", np.isnan(row)), ("inf", row == np.inf), ("-inf", row == -np.inf)):
                 reasons[wrong & (reasons == "")] = f"{label} is {text}"
-        rows = np.where(np.isfinite(rows), rows, 0)
-        exponent = exponents(kernel, rows, self.limit)
-        rows, values = scaled(kernel, rows, self.values_at(elements), exponent)
+        rows, values = np.where(np.isfinite(rows), rows, 0), self.values_at(elements)
         found = np.empty((self.count, elements.size), self.dtype)
-        margins, choice = self._again(0, np.arange(elements.size), rows, values, found)
-        other = ~(choice[0] > 0) if choice.size else np.zeros(elements.size, bool)
-        self._refuse(0, margins, other, reasons, only="energy")  # derivatives are the other shape's affair
-        self._refuse(0, margins, ~other, reasons)
-        other &= reasons == ""
-        if other.any() and len(kernel.shapes) == 1:
-            found[:, other] = 0
-        elif other.any():
-            second, _ = self._again(1, np.flatnonzero(other), rows, values, found)
-            everywhere = np.ones((len(second), elements.size), self.dtype)
-            everywhere[:, other] = second
-            self._refuse(1, everywhere, other, reasons)
-        unscale(kernel, self.wanted, found, exponent)
+        if kernel.portable and self.dtype == np.float32 and kernel.numbers != "double-double":
+            self._in_double(rows, values, found, reasons)
+        else:
+            self._by_shapes(rows, values, found, reasons)
         bad = ~np.isfinite(found).all(axis=0) & (reasons == "")
-        reasons[bad] = f"the result is not finite: an intermediate value is outside the range of {self.dtype}"
+        reasons[bad] = f"the result is not finite: it or a value on the way is outside the range of {self.dtype}"
         self.scatter(elements, found)
         self.reasons.update((int(elements[i]), str(reasons[i])) for i in np.flatnonzero(reasons != ""))
 
+    def _in_double(self, rows: Array, values: list[Any], found: Array, reasons: Array) -> None:
+        """Single precision's elements in double precision, whose range holds their products."""
+        wider = np.broadcast_arrays(*[np.asarray(value, np.float64) for value in values])
+        given: dict[str, Any] = dict(zip((name for name, _ in self.kernel.parameters), wider, strict=True))
+        for vector in self.kernel.vectors:
+            given[vector] = np.array([given.pop(f"{vector}_{axis}") for axis in "xyz"])
+        batch = Batch(self.kernel, self.wanted, rows.astype(np.float64), given, errors="mask")
+        found[:] = np.vstack(batch.results())
+        for element, reason in batch.reasons.items():
+            if not reason.startswith("the result") and not reasons[element]:
+                reasons[element] = reason
+
+    def _by_shapes(self, rows: Array, values: list[Any], found: Array, reasons: Array) -> None:
+        """Elements of any size, each by the shape that is right for it."""
+        size = rows.shape[1]
+        margins, choice = self._again(0, np.arange(size), rows, values, found)
+        other = ~(choice[0] > 0) if choice.size else np.zeros(size, bool)
+        self._refuse(0, margins, other, reasons, only="energy")  # derivatives are the other shape's affair
+        self._refuse(0, margins, ~other, reasons)
+        other &= reasons == ""
+        if other.any() and len(self.kernel.shapes) == 1:
+            found[:, other] = 0
+        elif other.any():
+            second, _ = self._again(1, np.flatnonzero(other), rows, values, found)
+            everywhere = np.ones((len(second), size), self.dtype)
+            everywhere[:, other] = second
+            self._refuse(1, everywhere, other, reasons)
+
     def _again(self, shape: int, picked: Any, rows: Array, values: list[Any], found: Array) -> tuple[Array, Array]:
-        """Evaluate chosen columns by a shape into ``found``."""
+        """Evaluate chosen columns by a shape into ``found``; of margins and choice the signs are right."""
+        kernel, checks = self.kernel, len(self.kernel.shapes[shape].checks)
         rows = rows[:, picked]
         values = [value if np.ndim(value) == 0 else value[picked] for value in values]
+        double = kernel.numbers != "double-double" and self.dtype == np.float64
+        if double and serves(tape := kernel.tape(shape, self.wanted, self.dtype)):
+            numbers = run_wide(tape, [*rows, *values])
+            for row, number in zip(found, numbers, strict=False):
+                row[picked] = rounded(number)
+            rest = np.empty((len(numbers) - self.count, rows.shape[1]))
+            for row, (mantissa, _) in zip(rest, numbers[self.count :], strict=True):
+                row[:] = mantissa
+            return rest[:checks], rest[checks:]
         part = np.empty((found.shape[0], rows.shape[1]), self.dtype)
         margins, choice = self.evaluator(shape)(rows, values, list(part))
         found[:, picked] = part
@@ -367,8 +416,3 @@ def _groups(found: list[Array]) -> list[Array]:
     """Indices in groups of at most a chunk."""
     every = np.concatenate(found) if found else np.empty(0, int)
     return [every[i : i + CHUNK] for i in range(0, every.size, CHUNK)]
-
-
-def _moderate(value: Any, limit: float) -> Any:
-    size = np.abs(value)
-    return (size == 0) | ((size > 1 / limit) & (size < limit))

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from yarnverify.files import write_text
 from yarnverify.kernels.tape import Tape
 
 if TYPE_CHECKING:
@@ -154,12 +155,9 @@ def _load(text: str) -> Callable[..., int]:
         raise RuntimeError("the engine 'compiled' needs numba: pip install 'yarnverify[compiled]'")
     name = "loop_" + hashlib.sha256(text.encode()).hexdigest()[:16]
     folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "yarnverify" / "loops"
-    folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.py"
     if not path.is_file():
-        draft = path.with_suffix(f".{os.getpid()}.tmp")
-        draft.write_text(text, encoding="utf-8")
-        draft.replace(path)
+        write_text(text, path)
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -202,6 +200,8 @@ class Loops:
         return self._margins(given)[0]
 
     def again(self) -> bool:
+        if not self._batch.tame(self._batch.rows):
+            return False
         found = self._by_first(*self._whole)
         if found != MIXED:
             return found == USUAL

@@ -1,7 +1,8 @@
 """Pairs ``high + low`` over arrays, for the variant ``reference``: twice the digits, rounded once at the end.
 
 The parts are extended doubles where the processor has them (64 bits each, so about 2^-126), since 2^-104 of plain doubles is
-not quite enough where 16 digits cancel; elsewhere plain doubles. Error-free transformations by Knuth and Dekker, on arrays.
+not quite enough where 16 digits cancel, and have the range for any product that occurs; elsewhere plain doubles, with no more
+than their range. Error-free transformations by Knuth and Dekker, on arrays.
 Kernels run on these numbers unchanged, but for the series of ``turning``, which is summed as far as pairs see it.
 """
 
@@ -58,6 +59,7 @@ class Pair:
     """An unevaluated sum of two arrays of doubles: ``high`` is the sum rounded, ``low`` what that lacks."""
 
     __slots__ = ("high", "low")
+    least = np.finfo(_REAL).smallest_subnormal
     __array_ufunc__ = None
 
     def __init__(self, high: Any, low: Any = _NOTHING) -> None:
@@ -146,7 +148,8 @@ def evaluator(
         results = [np.asarray(r.high if isinstance(r, Pair) else r) for r in function(given)]
         for target, result in zip(targets, results, strict=False):
             target[:] = result
-        rest = results[len(targets) :]
+        above = np.finfo(single).tiny  # what is positive stays so
+        rest = [np.where(r > 0, np.maximum(r, above), r) for r in results[len(targets) :]]
         return np.array([np.broadcast_to(r, rows[0].shape) for r in rest], single).reshape(len(rest), rows[0].size)
 
     return run

@@ -55,7 +55,7 @@ def rows_of(kernel: Kernel, q: ArrayLike) -> Array:
 
 def parameters_of(kernel: Kernel, given: Values, n: int, dtype: Any) -> tuple[Any, ...]:
     values = []
-    for name, positive, _ in kernel.parameters:
+    for name, positive in kernel.parameters:
         vector, _, axis = name.rpartition("_")
         value = (
             _component(kernel, vector, given[vector], axis, n) if vector in kernel.vectors else np.asarray(given[name])

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, Literal, TypedDict, Unpack
 
 import numpy as np
@@ -72,17 +71,11 @@ class Kernel:
     name, dofs
         The energy, and the names of the rows of ``q``.
     parameters
-        Name, whether it must not be negative, and the power of a factor of all lengths that it is scaled by; of a vector the
-        name of each component, such as ``g_x``.
-    vectors, velocities
-        Names of the parameters with three components, and of the unknowns that are velocities of points.
+        Name, and whether it must not be negative; of a vector the name of each component, such as ``g_x``.
+    vectors
+        Names of the parameters with three components.
     shapes
         The forms; where the first has a choice and is not the right one, the second is, or the energy is zero if there is none.
-    scaling
-        Which rows a change of scale touches: ``points`` for an energy of angles alone, else ``lengths``; ``none`` where
-        nothing is done for extreme sizes.
-    power
-        The power of a factor of all lengths that the energy is scaled by, where lengths are scaled.
     portable
         Whether only correctly rounded operations are used, so that bits are the same everywhere.
     numbers
@@ -95,23 +88,14 @@ class Kernel:
 
     name: str
     dofs: tuple[str, ...]
-    parameters: tuple[tuple[str, bool, int], ...]
+    parameters: tuple[tuple[str, bool], ...]
     shapes: tuple[Shape, ...]
     vectors: tuple[str, ...] = ()
-    velocities: tuple[str, ...] = ()
-    scaling: Literal["points", "lengths", "none"] = "lengths"
-    power: int = 1
     portable: bool = True
     numbers: Literal["float", "words", "double-double"] = "float"
     promise: Literal["units", "condition", "none"] = "units"
     loops: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # compiled ones, as they are made
     _tapes: dict[Any, Tape] = field(default_factory=dict, compare=False, repr=False)
-
-    @cached_property
-    def points(self) -> tuple[int, ...]:
-        """Rows that belong to points."""
-        named = [label.partition(".") for label in self.dofs]
-        return tuple(i for i, (name, dot, _) in enumerate(named) if dot and name not in self.velocities)
 
     def outputs(self, shape: int, wanted: str) -> Callable[[Sequence[Any]], list[Any]]:
         """The function of one shape with its results in a row: what is wanted, margins, choice."""

@@ -163,8 +163,10 @@ def split(value: Any) -> tuple[Any, Any]:
     return high, value - high
 
 
-def smallest(value: Any) -> float:
+def smallest(value: Any) -> Any:
     """The smallest positive number of the kind of ``value``."""
+    if hasattr(value, "least"):
+        return value.least
     return _SMALLEST[value.trace.dtype if isinstance(value, Traced) else np.dtype(np.float64)]
 
 

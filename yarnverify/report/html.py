@@ -16,6 +16,7 @@ from yarnverify.report.analysis import analysis_tables, fabric_line
 from yarnverify.report.benchmark import tables, where
 from yarnverify.report.mathml import compared, formula
 from yarnverify.report.pages import mistakes
+from yarnverify.report.proof import proof_of
 from yarnverify.report.scenes import scenes
 from yarnverify.report.simulation import frugality, summary
 from yarnverify.report.simulation_speed import speed_tables
@@ -84,6 +85,7 @@ def page(
         font=b64encode((_FOLDER / "fonts" / "stix-two-math.woff2").read_bytes()).decode(),
         found=found,
         derived=derived,
+        proofs={name: proof_of(derivation) for name, derivation in derived.items()},
         sections=_sections(found),
         mistakes=[{**claim, "marked": _marked(claim)} for claim in mistakes(found, None)],
         accuracy=records.get("accuracy"),

@@ -11,6 +11,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from yarnverify.report.accuracy import accuracy_table, kinds
 from yarnverify.report.analysis import analysis_tables, fabric_line
 from yarnverify.report.benchmark import benchmark_table, where
+from yarnverify.report.proof import proof_of
 from yarnverify.report.simulation import frugality, studies, summary
 from yarnverify.report.simulation_speed import speed_tables
 
@@ -64,6 +65,7 @@ def pages(
             section=section,
             found=found,
             derivation=derivation,
+            proof=proof_of(derivation),
             rows=_rows(found, section),
             mistakes=mistakes(found, section) if section else [],
             completeness=next((part for part in found["completeness"] if part["section"] == section), None),

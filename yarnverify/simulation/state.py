@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from yarnverify.errors import InputError, NotRunError, why
+from yarnverify.errors import InputError
+from yarnverify.files import whole
 
 Array = NDArray[Any]
 FORMAT = 1
@@ -41,47 +41,21 @@ def _plain(value: Any) -> Any:
 
 
 def save(path: str | os.PathLike[str], *, identity: str = "", **arrays: ArrayLike) -> None:
-    """Write arrays to an npz file, by way of a temporary file beside it that takes its place when it is complete.
+    """Write arrays to an npz file, whole or not at all.
 
     Raises
     ------
     NotRunError
-        The disk is full, the folder is missing, or the file cannot be written; an older file stays as it was.
+        The disk is full, or the file cannot be written; an older file stays as it was.
     """
     path = Path(path)
-    temporary = None
     named: dict[str, Any] = {"format": np.array(FORMAT), "identity": np.array(identity)}
     named |= {name: np.asarray(values) for name, values in arrays.items()}
     for name, values in named.items():
         if values.dtype.hasobject:
             raise TypeError(f"the state {name} cannot be saved: {values.dtype} is not an array of numbers")
-    try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
-            temporary = Path(file.name)
-            np.savez(file, **named)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except OSError as error:
-        raise NotRunError(f"the state could not be saved to {path}: {why(error)}") from None
-    finally:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
-    _sync(path.parent)
-
-
-def _sync(folder: Path) -> None:
-    """Make the new name last as well, where folders can be synchronised."""
-    try:
-        handle = os.open(folder, os.O_RDONLY)
-    except OSError:
-        return
-    try:
-        os.fsync(handle)
-    except OSError:
-        pass
-    finally:
-        os.close(handle)
+    with whole(path) as part, part.open("wb") as file:
+        np.savez(file, **named)
 
 
 def load(path: str | os.PathLike[str], identity: str = "") -> dict[str, Array]:

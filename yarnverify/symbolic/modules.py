@@ -12,7 +12,6 @@ from yarnverify.errors import NotRunError
 from yarnverify.source import load
 from yarnverify.symbolic.angles import prove_derivatives, prove_recurrence, turning_series
 from yarnverify.symbolic.declare import Energy, load_declarations
-from yarnverify.symbolic.dimensions import scaling_powers
 from yarnverify.symbolic.emit import dof_labels, given_symbols, identifier
 from yarnverify.symbolic.printing import LIBRARY, TEMPLATES, statements, text_of, used_functions
 from yarnverify.symbolic.programs import (
@@ -165,10 +164,6 @@ def module_text(
     units = f"{energy.unit}, {energy.unit}/m and {energy.unit}/m^2"
     vector, three = f"({len(dofs)}, n)", "tuple[Array, Array, Array]"
     labels = [label.replace(".", "") for label in dofs]
-    angles_alone = any("corner" in line for line in code.splitlines()) and "segment" not in code
-    whole, powers = scaling_powers(energy)
-    calls = set(library_calls(programs))
-    bare = variant in ("differentiated", "printed") and calls  # as a person would print it
     values = {
         "energy": energy,
         "title": _title(energy),
@@ -182,20 +177,15 @@ def module_text(
         "parameters": _tuple(names),
         "names": names,
         "scalars": [
-            (str(symbol), parameter.positive, powers[parameter.label])
+            (str(symbol), parameter.positive)
             for parameter in energy.parameters
             for symbol in given_symbols(parameter.name)
         ],
         "vectors": _tuple(identifier(p.name) for p in energy.parameters if p.name.bold),
-        "velocities": _tuple(
-            n.label for n, unit in zip(energy.unknowns, energy.units, strict=True) if n.bold and unit != "m"
-        ),
         "row_units": row_units(energy),
         "rows": len(dofs),
         "unpack": ", ".join(labels) + ("," if len(labels) == 1 else ""),
         "functions": functions,
-        "scaling": "none" if bare else "points" if angles_alone else "lengths",
-        "power": 1 if angles_alone else whole,
         "portable": not LIBRARY & set(tape),
         "promise": promise(variant, found, LIBRARY & set(tape)),
         "numbers": numbers(variant, found),

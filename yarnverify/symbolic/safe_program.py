@@ -75,9 +75,8 @@ def safe_program(
         choice = sums.safe(sp.sympify(choice))  # whether an energy acts is a jump: never a matter of rounding
     elif guarded and safe.corner is None:
         choice = sums.apart([*reading.steps.values(), value, *gradient, *hessian])
-    made = settled(
-        reading.steps, value, gradient, hessian, checks, choice, (lambda v: v) if digits == "plain" else sums.safe
-    )
+    ordered = sums.ordered if digits == "plain" else sums.safe
+    made = settled(reading.steps, value, gradient, hessian, checks, choice, ordered)
     code = [*made.steps.values(), *made.outputs]
     used = {str(symbol) for step in code for symbol in step.free_symbols}
     prologue = tuple(_prologue(safe, digits, used))
@@ -111,6 +110,10 @@ class Sums:
     def safe(self, value: Any) -> Any:
         """An expression with every sum that may cancel replaced."""
         return value.replace(self._is_mixed, self._parted).replace(self._is_sum, self._call)
+
+    def ordered(self, value: Any) -> Any:
+        """An expression in which a coordinate difference is taken before a length is added to it."""
+        return value.replace(lambda part: self._is_sum(part) and self._widened(part) is not None, self._widened)
 
     def apart(self, values: Iterable[Any]) -> Any:
         """What is positive where every sum with a length is more than rounding; None where there is no such sum."""

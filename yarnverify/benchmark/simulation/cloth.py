@@ -73,6 +73,7 @@ class _Solving:
 class Cloth:
     """A cloth of ``side`` x ``side`` crossings, three unknowns each but for the two that are held."""
 
+    side: int
     fabric: Fabric
     dynamics: Dynamics
     solver: Timed
@@ -104,7 +105,7 @@ class Cloth:
         x, y, z = fabric.points(Q).T
         z += 2e-5 * np.sin(900 * x) * np.cos(700 * y)
         z[held] = 0
-        return Cloth(fabric, dynamics, timed, dynamics.start(Q))
+        return Cloth(side, fabric, dynamics, timed, dynamics.start(Q))
 
     def step(self, iterations: int) -> dict[str, float]:
         """Seconds of processor time per iteration by part: the first few Newton iterations of a time step.

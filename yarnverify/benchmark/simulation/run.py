@@ -22,7 +22,6 @@ from yarnverify.simulation.linear.threads import one_thread
 
 SIZES = (100, 1_000, 10_000, 100_000)
 ROUNDS = 5
-LONG = 50_000  # crossings from which one round has to do
 ALPHA = 1.0
 GOALS = {1e-3: PEERS, 1e-4: ("jax",)}
 OWN = ("yarnverify, compiled", "yarnverify, NumPy")
@@ -74,7 +73,7 @@ def benchmark_simulation(
             )
             for goal, allowed in GOALS.items()
         }
-        cloth = {solver: [_cloth(side, solver, rounds, advance, steps) for side in sides] for solver in SOLVERS}
+        cloth = {solver: _cloths(sides, solver, rounds, lambda label: advance(label, steps)) for solver in SOLVERS}
     packages = {name for found in cantilever.values() for name in found.pop("packages")}
     return {
         "schema": 1,
@@ -102,32 +101,41 @@ def _command(sizes: Sequence[int], peers: Sequence[str], rounds: int) -> str:
 # -- cloth
 
 
-def _cloth(side: int, solver: str, rounds: int, advance: Advance, steps: int) -> dict[str, Any]:
-    """Seconds per iteration by part, as least of some steps, shares of the memory floor, and memory."""
-    cloth = Cloth.made(side, solver)
-    large = side * side >= LONG
-    cloth.step(1)
-    found = [cloth.step(1 if large else 3) for _ in range(1 if large else rounds)]
-    best = {name: min(each[name] for each in found) for name in (*PARTS, "iteration")}
-    floors = cloth.floors()
+def _cloths(sides: Sequence[int], solver: str, rounds: int, advance: Callable[[str], None]) -> list[dict[str, Any]]:
+    """Seconds of an iteration by part, shares of the memory floor, and memory, for cloths of some sizes.
+
+    A round takes every size once: a machine that becomes slower does so for all of them, and growth is not made of it.
+    """
+    cloths = [Cloth.made(side, solver) for side in sides]
+    for cloth in cloths:
+        cloth.step(1)
+    found = [[cloth.step(1) for cloth in cloths] for _ in range(rounds)]
+    records = [_record(cloth, steps) for cloth, steps in zip(cloths, zip(*found, strict=True), strict=True)]
+    del cloth, cloths
+    for side, record in zip(sides, records, strict=True):
+        try:
+            record["bytes"] = round(peak(side, solver))
+        except NotRunError as reason:
+            record["bytes"], record["bytes not known"] = None, str(reason)
+        advance(f"cloth of {side} x {side}, {solver}")
+    return records
+
+
+def _record(cloth: Cloth, steps: Sequence[dict[str, float]]) -> dict[str, Any]:
+    """The least of some steps, by part."""
+    best = {name: min(each[name] for each in steps) for name in (*PARTS, "iteration")}
     bandwidth = {name: min(paired({"copy": copying(size)}, 3, time.process_time)["copy"])
-                 for name, size in floors.items()}  # fmt: skip
-    record: dict[str, Any] = {
-        "crossings": side * side,
-        "unknowns": cloth.dynamics.system.count,
-        "elements": sum(term.table.count for term in cloth.dynamics.system.terms),
-        "engine": cloth.dynamics.system.engine,
-        "inner": round(found[0]["inner"], 1),
+                 for name, size in cloth.floors().items()}  # fmt: skip
+    system = cloth.dynamics.system
+    return {
+        "crossings": cloth.side**2,
+        "unknowns": system.count,
+        "elements": sum(term.table.count for term in system.terms),
+        "engine": system.engine,
+        "inner": round(steps[0]["inner"], 1),
         "seconds": {name: _short(value) for name, value in best.items()},
         "floor": {name: _short(value) for name, value in bandwidth.items()},
     }
-    del cloth
-    try:
-        record["bytes"] = round(peak(side, solver))
-    except NotRunError as reason:
-        record["bytes"], record["bytes not known"] = None, str(reason)
-    advance(f"cloth of {side} x {side}, {solver}", steps)
-    return record
 
 
 def _growth(found: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -52,9 +52,9 @@ KERNEL = runtime.Kernel(
     name="parallel_contact",
     dofs=DOFS,
     parameters=(
-        ("k_c", True, 0),
-        ("L", True, 1),
-        ("d", True, 1),
+        ("k_c", True),
+        ("L", True),
+        ("d", True),
     ),
     shapes=(
         runtime.Shape(
@@ -63,8 +63,6 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="lengths",
-    power=3,
     portable=True,
     numbers="float",
 )

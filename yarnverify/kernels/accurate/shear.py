@@ -204,8 +204,8 @@ KERNEL = runtime.Kernel(
     name="shear",
     dofs=DOFS,
     parameters=(
-        ("k_x", True, 0),
-        ("L", True, 1),
+        ("k_x", True),
+        ("L", True),
     ),
     shapes=(
         runtime.Shape(
@@ -217,7 +217,6 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="points",
     portable=True,
     numbers="float",
 )

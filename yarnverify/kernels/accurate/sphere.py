@@ -76,11 +76,11 @@ KERNEL = runtime.Kernel(
     name="sphere",
     dofs=DOFS,
     parameters=(
-        ("k", True, 0),
-        ("c_x", False, 1),
-        ("c_y", False, 1),
-        ("c_z", False, 1),
-        ("R", True, 1),
+        ("k", True),
+        ("c_x", False),
+        ("c_y", False),
+        ("c_z", False),
+        ("R", True),
     ),
     shapes=(
         runtime.Shape(
@@ -91,8 +91,6 @@ KERNEL = runtime.Kernel(
         ),
     ),
     vectors=("c",),
-    scaling="lengths",
-    power=3,
     portable=True,
     numbers="float",
 )

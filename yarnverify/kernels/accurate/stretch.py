@@ -202,7 +202,7 @@ KERNEL = runtime.Kernel(
     name="stretch",
     dofs=DOFS,
     parameters=(
-        ("k_s", True, 0),
+        ("k_s", True),
     ),
     shapes=(
         runtime.Shape(
@@ -220,7 +220,6 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="lengths",
     portable=True,
     numbers="float",
 )

@@ -215,7 +215,7 @@ KERNEL = runtime.Kernel(
     name="bending",
     dofs=DOFS,
     parameters=(
-        ("k_b", True, 0),
+        ("k_b", True),
     ),
     shapes=(
         runtime.Shape(
@@ -228,8 +228,6 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="none",
-    power=-1,
     portable=False,
     numbers="float",
 )

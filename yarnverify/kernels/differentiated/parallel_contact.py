@@ -51,9 +51,9 @@ KERNEL = runtime.Kernel(
     name="parallel_contact",
     dofs=DOFS,
     parameters=(
-        ("k_c", True, 0),
-        ("L", True, 1),
-        ("d", True, 1),
+        ("k_c", True),
+        ("L", True),
+        ("d", True),
     ),
     shapes=(
         runtime.Shape(
@@ -62,8 +62,6 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="lengths",
-    power=3,
     portable=True,
     numbers="float",
 )

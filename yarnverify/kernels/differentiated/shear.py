@@ -190,8 +190,8 @@ KERNEL = runtime.Kernel(
     name="shear",
     dofs=DOFS,
     parameters=(
-        ("k_x", True, 0),
-        ("L", True, 1),
+        ("k_x", True),
+        ("L", True),
     ),
     shapes=(
         runtime.Shape(
@@ -203,7 +203,6 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="none",
     portable=False,
     numbers="float",
 )

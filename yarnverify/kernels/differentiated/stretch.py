@@ -121,7 +121,7 @@ KERNEL = runtime.Kernel(
     name="stretch",
     dofs=DOFS,
     parameters=(
-        ("k_s", True, 0),
+        ("k_s", True),
     ),
     shapes=(
         runtime.Shape(
@@ -132,7 +132,6 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="lengths",
     portable=True,
     numbers="float",
 )

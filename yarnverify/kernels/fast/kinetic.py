@@ -133,7 +133,7 @@ KERNEL = runtime.Kernel(
     name="kinetic",
     dofs=DOFS,
     parameters=(
-        ("rho", True, 0),
+        ("rho", True),
     ),
     shapes=(
         runtime.Shape(
@@ -143,9 +143,6 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    velocities=("v0", "v1"),
-    scaling="lengths",
-    power=3,
     portable=True,
     numbers="float",
 )

@@ -277,7 +277,7 @@ KERNEL = runtime.Kernel(
     name="bending",
     dofs=DOFS,
     parameters=(
-        ("k_b", True, 0),
+        ("k_b", True),
     ),
     shapes=(
         runtime.Shape(
@@ -290,8 +290,6 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="none",
-    power=-1,
     portable=False,
     numbers="float",
 )

@@ -54,9 +54,9 @@ KERNEL = runtime.Kernel(
     name="parallel_contact",
     dofs=DOFS,
     parameters=(
-        ("k_c", True, 0),
-        ("L", True, 1),
-        ("d", True, 1),
+        ("k_c", True),
+        ("L", True),
+        ("d", True),
     ),
     shapes=(
         runtime.Shape(
@@ -65,8 +65,6 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="lengths",
-    power=3,
     portable=True,
     numbers="float",
 )

@@ -122,7 +122,7 @@ KERNEL = runtime.Kernel(
     name="stretch",
     dofs=DOFS,
     parameters=(
-        ("k_s", True, 0),
+        ("k_s", True),
     ),
     shapes=(
         runtime.Shape(
@@ -133,7 +133,6 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="lengths",
     portable=True,
     numbers="float",
 )

@@ -450,7 +450,7 @@ KERNEL = runtime.Kernel(
     name="bending",
     dofs=DOFS,
     parameters=(
-        ("k_b", True, 0),
+        ("k_b", True),
     ),
     shapes=(
         runtime.Shape(
@@ -471,7 +471,6 @@ KERNEL = runtime.Kernel(
             ),
         ),
     ),
-    scaling="points",
     portable=True,
     numbers="double-double",
 )

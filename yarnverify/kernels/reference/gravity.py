@@ -62,10 +62,10 @@ KERNEL = runtime.Kernel(
     name="gravity",
     dofs=DOFS,
     parameters=(
-        ("rho", True, 0),
-        ("g_x", False, 1),
-        ("g_y", False, 1),
-        ("g_z", False, 1),
+        ("rho", True),
+        ("g_x", False),
+        ("g_y", False),
+        ("g_z", False),
     ),
     shapes=(
         runtime.Shape(
@@ -76,8 +76,6 @@ KERNEL = runtime.Kernel(
         ),
     ),
     vectors=("g",),
-    scaling="lengths",
-    power=3,
     portable=True,
     numbers="double-double",
 )

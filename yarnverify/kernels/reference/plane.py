@@ -55,14 +55,14 @@ KERNEL = runtime.Kernel(
     name="plane",
     dofs=DOFS,
     parameters=(
-        ("k", True, 0),
-        ("n_x", False, 0),
-        ("n_y", False, 0),
-        ("n_z", False, 0),
-        ("p_x", False, 1),
-        ("p_y", False, 1),
-        ("p_z", False, 1),
-        ("R", True, 1),
+        ("k", True),
+        ("n_x", False),
+        ("n_y", False),
+        ("n_z", False),
+        ("p_x", False),
+        ("p_y", False),
+        ("p_z", False),
+        ("R", True),
     ),
     shapes=(
         runtime.Shape(
@@ -72,8 +72,6 @@ KERNEL = runtime.Kernel(
         ),
     ),
     vectors=("n", "p"),
-    scaling="lengths",
-    power=3,
     portable=True,
     numbers="double-double",
 )

@@ -77,11 +77,11 @@ KERNEL = runtime.Kernel(
     name="sphere",
     dofs=DOFS,
     parameters=(
-        ("k", True, 0),
-        ("c_x", False, 1),
-        ("c_y", False, 1),
-        ("c_z", False, 1),
-        ("R", True, 1),
+        ("k", True),
+        ("c_x", False),
+        ("c_y", False),
+        ("c_z", False),
+        ("R", True),
     ),
     shapes=(
         runtime.Shape(
@@ -92,8 +92,6 @@ KERNEL = runtime.Kernel(
         ),
     ),
     vectors=("c",),
-    scaling="lengths",
-    power=3,
     portable=True,
     numbers="double-double",
 )
