@@ -29,11 +29,11 @@ def hinge(x0: Point, x1: Point, x2: Point, x3: Point, *, k: Positive["J"], theta
 @energy
 def triangle(
     x0: Point, x1: Point, x2: Point,
-    *, mu: Positive["N/m"], nu: Positive["N/m"], a: Positive["m"], b: Real["m"], c: Positive["m"],
+    *, mu: Positive["N/m"], nu: Positive["N/m"], a: Positive["m"], c: Positive["m"],
 ):
-    """St. Venant and Kirchhoff's, of the rest shape (0, 0), (a, 0), (b, c)."""
+    """St. Venant and Kirchhoff's, of the rest shape (0, 0), (a, 0), (0, c)."""
     f = (x1 - x0) / a
-    g = (x2 - x0 - (x1 - x0) * b / a) / c
+    g = (x2 - x0) / c
     p, q = (dot(f, f) - 1) / 2, (dot(g, g) - 1) / 2
     return a * c / 2 * (mu * (p**2 + q**2 + dot(f, g) ** 2 / 2) + nu / 2 * (p + q) ** 2)
 
