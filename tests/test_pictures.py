@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import pytest
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
 
 from yarnverify.report.marks import front, mark, spaced
+from yarnverify.report.names import HIGH, LETTER, places
 from yarnverify.report.pictures import error_against_angle, speed_against_error, write
 
 DISTANCES = [10.0**-k for k in range(0, 16, 3)]
@@ -101,10 +102,37 @@ def test_everybody_is_named() -> None:
     assert len(figure.axes) == 6  # three outputs, towards 0 and pi; nothing happens at the right angle
     for name in VARIANTS:
         assert texts(figure).count(name) == 4  # at the end of three lines, and in the legend
-    shown = texts(speed_against_error(SPEED, "bending"))
-    for name in ("accurate", "printed", "jax", "newcomer"):
-        assert shown.count(name) == 2, name
-    assert "memory floor" not in shown
+    figure = speed_against_error(SPEED, "bending")
+    (legend,) = figure.legends
+    assert {text.get_text() for text in legend.get_texts()} >= {"accurate", "printed", "jax", "newcomer"}
+    for axes in figure.axes:  # beside its spot, who is on the front
+        spots = [line for line in axes.lines if line.get_linestyle() == "None"]
+        best = [spot for spot in spots if spot.get_markerfacecolor() != "none"]
+        assert 0 < len(best) < len(spots)
+        assert len([text for text in texts(axes) if text in {each.get_text() for each in legend.get_texts()}]) == len(
+            best
+        )
+    assert "memory floor" not in texts(figure)
+
+
+def test_names_cover_no_spot_no_line_and_no_other_name() -> None:
+    spots = {"one": (50.0, 50.0), "another": (54.0, 52.0), "third": (60.0, 48.0), "far": (150.0, 90.0)}
+    lines = [((10.0, 81.0), (190.0, 81.0))]
+    frame = 0.0, 0.0, 200.0, 100.0
+    found = places(spots, spots, lines, frame)
+    boxes = {}
+    for name, (shift, led) in found.items():
+        x, y, wide = spots[name][0] + shift[0], spots[name][1] + shift[1], LETTER * len(name) / 2
+        boxes[name] = x - wide, y - HIGH / 2, x + wide, y + HIGH / 2
+        assert frame[0] <= boxes[name][0] and boxes[name][2] <= frame[2]
+        assert frame[1] <= boxes[name][1] and boxes[name][3] <= frame[3]
+        inside = [
+            1 for a, b in spots.values() if boxes[name][0] < a < boxes[name][2] and boxes[name][1] < b < boxes[name][3]
+        ]
+        assert not inside and not boxes[name][1] < 81 < boxes[name][3]
+        assert not led or name != "far"
+    for a, b in combinations(boxes.values(), 2):
+        assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
 
 
 def test_the_right_angle_is_shown_where_the_condition_grows() -> None:

@@ -20,9 +20,9 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocat
 
 from yarnverify.report.benchmark import shown_size
 from yarnverify.report.marks import NONE_LEFT, front, mark, spaced
+from yarnverify.report.names import places
 
 OUTPUTS = {"E": "energy", "G": "gradient", "H": "Hessian"}
-_LETTER = 4.7  # points: the width of a letter at the size of names
 _LEAST = 0.1  # units; smaller errors are drawn here
 _WRONG, _NOTHING = 2e17, 2e20  # where results without a correct digit, and those without a value, are drawn
 _EDGES = (NONE_LEFT, 7e18, 6e21)  # lower edges of both bands, and the top
@@ -195,11 +195,12 @@ def speed_against_error(record: dict[str, Any], energy: str) -> Figure:
     left.set_xlim(low, high)
     left.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 200 * low else (1,)))
     left.set_ylabel("worst error in units of $2^{-53}$")
-    key = "filled, bold, dashed line: the Pareto front; italic: what else people use"
-    figure.suptitle(f"{energy}: speed against error ({key})", fontsize=9)
+    front_is = "filled and named, dashed line: the Pareto front; italic: what else people use"
+    figure.suptitle(f"{energy}: speed against error ({front_is})", fontsize=9)
+    _key(figure, names, found["contestants"])
     figure.draw_without_rendering()  # settles the layout, so that names can be placed in points
     for axes, states in ((left, easy), (right, hard)):
-        _scatter(axes, times, {name: _worst(found["errors"], states, name) for name in names}, found["contestants"])
+        _scatter(axes, times, {name: _worst(found["errors"], states, name) for name in names})
     return figure
 
 
@@ -208,9 +209,7 @@ def _worst(errors: dict[str, Any], states: Sequence[str], name: str) -> float | 
     return "inf" if None in values else max(values, default=0.0)
 
 
-def _scatter(
-    axes: Axes, times: dict[str, list[float]], errors: dict[str, float | str], contestants: dict[str, Any]
-) -> None:
+def _scatter(axes: Axes, times: dict[str, list[float]], errors: dict[str, float | str]) -> None:
     names = list(times)
     spots = {name: (times[name][0], _height(errors[name])) for name in names}
     for band in (_WRONG, _NOTHING):  # heights in a band mean nothing; neighbours take different ones
@@ -229,20 +228,19 @@ def _scatter(
         axes.plot(times[name][1:], [y, y], color=style.colour, linewidth=0.8, alpha=0.5, zorder=2)
         lines.append(((times[name][1], y), (times[name][2], y)))
         axes.plot(
-            x, y, marker=style.marker, color=style.colour, markersize=7, linestyle="none", zorder=3,
-            markerfacecolor=style.colour if name in best else "white",
+            x, y, marker=style.marker, color=style.colour, markersize=7, linestyle="none", zorder=3 + (name not in best),
+            markerfacecolor=style.colour if name in best else "none",  # so that no spot hides another
         )  # fmt: skip
-    _names_beside(axes, spots, lines, best, contestants)
+    _names_beside(axes, best, spots, lines)
 
 
 def _names_beside(
     axes: Axes,
+    named: Sequence[str],
     spots: dict[str, tuple[float, float]],
     lines: Sequence[tuple[tuple[float, float], tuple[float, float]]],
-    best: Sequence[str],
-    contestants: dict[str, Any],
 ) -> None:
-    """A name beside each spot, at the first of several places where it covers no spot, no line and no other name."""
+    """The names of some spots, with a leader where they cannot be near; the others are in the legend alone."""
     scale = 72 / axes.figure.dpi
 
     def in_points(spot: tuple[float, float]) -> tuple[float, float]:
@@ -250,57 +248,26 @@ def _names_beside(
         return float(x), float(y)
 
     (left, bottom), (right, top) = axes.transAxes.transform([(0, 0), (1, 1)]) * scale
-    points = {name: in_points(spot) for name, spot in spots.items()}
-    solid = [(x - 4, y - 4, x + 4, y + 4) for x, y in points.values()]  # what a line to a name must not cross
-    taken = list(solid)
-    for ends in lines:
-        (x0, x1), (y0, y1) = (sorted(part) for part in zip(*map(in_points, ends), strict=True))
-        taken.append((x0 - 0.5, y0 - 0.5, x1 + 0.5, y1 + 0.5))
-    for name in sorted(spots, key=lambda each: (-points[each][1], points[each][0])):
-        x, y = points[name]
-        wide, high = _LETTER * len(name), 8.0
-        shifts = [(8.0 * i, 9.0 * j) for j in range(-10, 11) for i in range(-15, 16)]
-        shifts += [(side * (7 + wide / 2), dy) for side in (1, -1) for dy in (0.0, 3.0, -3.0)]
-        boxes = [
-            (x + dx - wide / 2, y + dy - high / 2, x + dx + wide / 2, y + dy + high / 2)
-            for dx, dy in sorted(shifts, key=lambda shift: _gap(shift, wide, high))
-        ]
-        own = (x - 4, y - 4, x + 4, y + 4)
-        free = [
-            box
-            for box in boxes
-            if left < box[0] and box[2] < right and bottom < box[1] and box[3] < top
-            and not any(_overlap(box, other) for other in taken)
-        ]  # fmt: skip
-        clear = [box for box in free if not any(_crosses((x, y), box, other) for other in solid if other != own)]
-        box = (clear or free or boxes)[0]
-        solid.append(box)
-        taken.append(box)
-        a, b = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
-        colour = mark(name, list(spots)).colour
-        lead = {"arrowstyle": "-", "color": colour, "linewidth": 0.5, "shrinkA": 0, "shrinkB": 3}
+    ends = [(in_points(a), in_points(b)) for a, b in lines]
+    there = {name: in_points(spot) for name, spot in spots.items()}
+    lead = {"arrowstyle": "-", "color": "0.4", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
+    for name, (shift, led) in places(named, there, ends, (left, bottom, right, top)).items():
         axes.annotate(
-            name, spots[name], xytext=(a - x, b - y), textcoords="offset points", ha="center", va="center",
-            fontsize=7.5, color="0.1", fontweight="bold" if name in best else "normal",
-            fontstyle="italic" if contestants[name]["kind"] == "peer" else "normal",
-            arrowprops=lead if _gap((a - x, b - y), wide, high) > 9 else None,
+            name, spots[name], xytext=shift, textcoords="offset points", ha="center", va="center",
+            fontsize=7.5, fontweight="bold", arrowprops=lead if led else None,
         )  # fmt: skip
 
 
-def _gap(shift: tuple[float, float], wide: float, high: float) -> float:
-    """How far a spot is from the box of a name whose middle is shifted against it."""
-    return math.hypot(max(abs(shift[0]) - wide / 2, 0.0), max(abs(shift[1]) - high / 2, 0.0)) + 0.01 * abs(shift[0])
-
-
-def _crosses(spot: tuple[float, float], box: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    """Whether the line from a spot to the middle of a box crosses another box."""
-    a, b = (box[0] + box[2]) / 2 - spot[0], (box[1] + box[3]) / 2 - spot[1]
-    steps = (k / 32 for k in range(33) if math.hypot(a, b) * k / 32 > 9)  # spots may overlap each other
-    return any(other[0] < spot[0] + t * a < other[2] and other[1] < spot[1] + t * b < other[3] for t in steps)
-
-
-def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
-    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+def _key(figure: Figure, names: Sequence[str], contestants: dict[str, Any]) -> None:
+    """The marks and names of all, below the panels; italic is what else people use."""
+    spots = [
+        Line2D([], [], color=(own := mark(name, names)).colour, marker=own.marker, linestyle="none", markersize=7,
+               markerfacecolor="none", label=name)
+        for name in names
+    ]  # fmt: skip
+    legend = figure.legend(handles=spots, loc="outside lower center", ncols=math.ceil(len(spots) / 2), frameon=False)
+    for text, name in zip(legend.get_texts(), names, strict=True):
+        text.set_fontstyle("italic" if contestants[name]["kind"] == "peer" else "normal")
 
 
 # -- what both share --------------------------------------------------------------------------------------------------
