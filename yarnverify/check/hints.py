@@ -89,11 +89,10 @@ def factor_hints(found: Found, cases: Cases) -> list[str]:
     if right or not wrong or any(diagnosis.factor is None for _, diagnosis in wrong):
         return []
     texts = {str(diagnosis.factor).lstrip("-") for _, diagnosis in wrong}
-    stiffness = shape_of(cases.energy).stiffness
+    name = next(iter(shape_of(cases.energy).others), None)
     first = wrong[0][1].factor
-    if len(texts) != 1 or stiffness is None or first is None or first.is_sign or str(first).lstrip("-") == "1":
+    if len(texts) != 1 or name is None or first is None or first.is_sign or str(first).lstrip("-") == "1":
         return []
-    name = stiffness[0]
     if first.powers == ((name, -1),) and abs(abs(first.number) - 1) < 1e-5:
         return [f"{name} is not used: matches with --fix {name}=1"]
     if first.powers:
@@ -147,8 +146,8 @@ def order_hint(
     if any(row.index is None for row in convention.rows):
         return []
     at = np.flatnonzero(cases.of_regime("moderate"))[:_TRIED]
-    candidates = orders(convention, cases)
-    if not at.size or not candidates:
+    candidates = [("", convention.rows), *orders(convention, cases)]
+    if not at.size or len(candidates) == 1:
         return []
     places = [[row.index for row in rows if row.index is not None] for _, rows in candidates]
     states = np.vstack([cases.points.q[place][:, at].T for place in places])
@@ -159,6 +158,8 @@ def order_hint(
         part = flat[number * at.size : (number + 1) * at.size]
         results = decoded(part, replace(convention, rows=rows), cases.dof)
         signs = _signs(results, cases, at)
+        if signs and not text:  # all is right here as it is: what is wrong elsewhere is not the order
+            return []
         if signs:
             flags = _flags(signs, convention)
             if by_name:

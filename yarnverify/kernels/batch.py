@@ -30,7 +30,7 @@ from yarnverify.kernels.inputs import (
     rows_of,
 )
 from yarnverify.kernels.memory import scratch
-from yarnverify.kernels.wide import rounded, run_wide
+from yarnverify.kernels.wide import rounded, run_wide, serves
 
 if TYPE_CHECKING:
     from yarnverify.kernels.runtime import Kernel
@@ -375,8 +375,9 @@ class Batch:
         kernel, checks = self.kernel, len(self.kernel.shapes[shape].checks)
         rows = rows[:, picked]
         values = [value if np.ndim(value) == 0 else value[picked] for value in values]
-        if kernel.portable and kernel.numbers != "double-double":
-            numbers = run_wide(kernel.tape(shape, self.wanted, self.dtype), [*rows, *values])
+        double = kernel.numbers != "double-double" and self.dtype == np.float64
+        if double and serves(tape := kernel.tape(shape, self.wanted, self.dtype)):
+            numbers = run_wide(tape, [*rows, *values])
             for row, number in zip(found, numbers, strict=False):
                 row[picked] = rounded(number)
             rest = np.empty((len(numbers) - self.count, rows.shape[1]))

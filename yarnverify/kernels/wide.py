@@ -73,6 +73,21 @@ def _sqrt(a: Wide) -> Wide:
     return _normal(np.sqrt(np.ldexp(a[0], odd.astype(np.int32))), (a[1] - odd) // 2)
 
 
+def _log(a: Wide) -> Wide:
+    near = np.abs(a[1]) < 1000
+    return wide(np.where(near, np.log(rounded(a)), np.log(a[0]) + a[1] * np.log(2.0)))
+
+
+def _arctan2(a: Wide, b: Wide) -> Wide:
+    first, second, _ = _aligned(a, b)
+    slight = (second > 0) & (a[1] < b[1] - 40)  # where an angle is its tangent
+    return _where(slight, _CALLS["divide"](a, b), wide(np.arctan2(first, second)))
+
+
+def _of_floats(function: Any) -> Any:
+    return lambda a: wide(function(rounded(a)))
+
+
 _CALLS: dict[str, Any] = {
     "add": _add,
     "subtract": _subtract,
@@ -84,7 +99,14 @@ _CALLS: dict[str, Any] = {
     "sqrt": _sqrt,
     "maximum": _maximum,
     "select": _select,
-}
+    "log": _log,
+    "arctan2": _arctan2,
+} | {f.__name__: _of_floats(f) for f in (np.cos, np.exp, np.expm1, np.log1p, np.sin, np.sinh, np.tan)}
+
+
+def serves(tape: Tape) -> bool:
+    """Whether all that a tape does can be done here: not arc cosines, which hold few digits of small angles anyway."""
+    return all(name in _CALLS for name, _, _ in tape.calls)
 
 
 def run_wide(tape: Tape, inputs: Sequence[Any]) -> list[Wide]:
@@ -93,7 +115,7 @@ def run_wide(tape: Tape, inputs: Sequence[Any]) -> list[Wide]:
     Parameters
     ----------
     tape
-        Of float64, without functions other than roots.
+        Of float64, one that this module ``serves``.
     inputs
         Finite floats, each (m,) or 0-d.
     """
