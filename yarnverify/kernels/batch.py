@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
@@ -30,7 +30,7 @@ from yarnverify.kernels.inputs import (
     rows_of,
 )
 from yarnverify.kernels.memory import scratch
-from yarnverify.kernels.wide import rounded, run_wide
+from yarnverify.kernels.wide import holds, rounded, run_wide
 
 if TYPE_CHECKING:
     from yarnverify.kernels.runtime import Kernel
@@ -84,6 +84,7 @@ class Batch:
         self.values = parameters_of(kernel, parameters, self.n, self.dtype)
         self.limit, self.small = _MODERATE[self.dtype], _SMALL[self.dtype]
         self.watch = self._extreme_values()
+        self.grows = not kernel.portable and self._of_any_size  # exponentials of moderate numbers may overflow
         self.threads, self.engine = threads, engine
         dof, n = self.dof, self.n
         self._scalars = {"E": 1, "G": dof, "H": dof * (dof + 1) // 2}
@@ -96,7 +97,7 @@ class Batch:
     def again(self) -> list[Array]:
         """The outputs for what the rows hold by now, which must be the caller's own array of this kind, not a copy."""
         self.reasons.clear()
-        if self._kept is not None and self.n <= CHUNK and self.watch is None and self._kept.again():
+        if self._kept is not None and self.n <= CHUNK and self.watch is None and not self.grows and self._kept.again():
             return self.out
         return self.results()
 
@@ -282,6 +283,9 @@ class Batch:
     def _strange(self, margins: Array, where: Where) -> Array | None:
         """Elements that are not as tame as nearly all are; None if there are none."""
         watch = None if self.watch is None else self.watch[where]
+        if self.grows:
+            over = np.asarray(~np.isfinite(self.targets(where)).all(axis=0))
+            watch = over if watch is None else watch | over
         if self.within(margins):
             return watch
         strange = ~((margins > 1 / self.limit) & (margins < self.limit)).all(axis=0)
@@ -323,6 +327,13 @@ class Batch:
 
     # -- elements that need care
 
+    @cached_property
+    def _of_any_size(self) -> bool:
+        """Whether elements of any size can be evaluated, by numbers with exponents of their own."""
+        kernel = self.kernel
+        shapes = range(len(kernel.shapes)) if kernel.numbers != "double-double" else ()
+        return bool(shapes) and all(holds(kernel.tape(shape, self.wanted, self.dtype)) for shape in shapes)
+
     def _special(self, elements: Array) -> None:
         """Evaluate a few elements again, at a scale near 1, or find out why they have no value."""
         kernel = self.kernel
@@ -333,7 +344,7 @@ class Batch:
                 reasons[wrong & (reasons == "")] = f"{label} is {text}"
         rows, values = np.where(np.isfinite(rows), rows, 0), self.values_at(elements)
         found = np.empty((self.count, elements.size), self.dtype)
-        if kernel.portable and self.dtype == np.float32 and kernel.numbers != "double-double":
+        if self._of_any_size and self.dtype == np.float32:
             self._in_double(rows, values, found, reasons)
         else:
             self._by_shapes(rows, values, found, reasons)
@@ -375,7 +386,7 @@ class Batch:
         kernel, checks = self.kernel, len(self.kernel.shapes[shape].checks)
         rows = rows[:, picked]
         values = [value if np.ndim(value) == 0 else value[picked] for value in values]
-        if kernel.portable and kernel.numbers != "double-double":
+        if self._of_any_size:
             numbers = run_wide(kernel.tape(shape, self.wanted, self.dtype), [*rows, *values])
             for row, number in zip(found, numbers, strict=False):
                 row[picked] = rounded(number)
