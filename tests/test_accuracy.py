@@ -234,11 +234,11 @@ def test_angles_cover_their_range(regime: str, distance: Any, low: float, high: 
 
 def test_measures_are_found_in_the_expression(declarations: Any) -> None:
     bending, stretch = (shape_of(declared(declarations, name)) for name in ("bending", "stretch"))
-    assert bending.angle and bending.only_angles and bending.stiffness == ("k_b", 2)
+    assert bending.angle and bending.only_angles and bending.others == {"k_b": 2}
     assert [(edge.head.label, edge.tail.label) for edge in bending.edges] == [("x1", "x0"), ("x0", "x2")]
-    assert not stretch.angle and not stretch.only_angles and stretch.stiffness == ("k_s", 0)
+    assert not stretch.angle and not stretch.only_angles and stretch.others == {"k_s": 0}
     contact = shape_of(declared(declarations, "parallel_contact"))
-    assert contact.edges == () and contact.lengths == ("L", "d") and contact.stiffness == ("k_c", -2)
+    assert contact.edges == () and contact.lengths == ("L", "d") and contact.others == {"k_c": -2}
 
 
 def test_an_energy_of_another_paper_has_regimes_without_further_work() -> None:

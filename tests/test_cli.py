@@ -315,3 +315,22 @@ def test_a_narrow_encoding_of_the_output_is_no_traceback(home: Path) -> None:
     environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
     done = program("-m", "yarnverify", "prove", "é.md", "--derivations", "none", "--json=-", cwd=home, env=environment)
     assert done.returncode == 0 and json.loads(done.stdout)["claims"][0]["section"] == "Sprïng"
+
+
+def test_an_interruption_while_a_library_is_loaded_is_no_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Extension modules turn it into an ImportError; any other ImportError is one."""
+    from yarnverify import cli
+
+    def loading(cause: BaseException) -> Any:
+        def app(*_: Any, **__: Any) -> None:
+            raise ImportError("initialization failed") from cause
+
+        return app
+
+    monkeypatch.setattr(cli, "app", loading(KeyboardInterrupt()))
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    assert stopped.value.code == 130
+    monkeypatch.setattr(cli, "app", loading(ValueError()))
+    with pytest.raises(ImportError):
+        cli.main()

@@ -50,12 +50,15 @@ OTHERS: list[tuple[str, tuple[int, ...], dict[str, Any]]] = [
     ("elastica", (40, 80, 160), {"alpha": 30.0, "length": 0.2}),
     ("heavy_cantilever", (30, 60), {"length": 0.01}),
     ("end_moment", (20, 40), {"turn": -6.28}),
+    ("end_moment", (20,), {"turn": -5.0}),  # the mirror image
     ("closed_ring", (3, 5, 50), {"flat": 1.5}),
     ("buckling", (10, 30), {"load": 1.8}),
     ("catenary", (10, 40), {"span": 0.11, "rise": -0.03}),
     ("sliding_yarn", (2, 9), {"uneven": 10.0, "strain": 0.5}),
     ("pressed_yarns", (2, 3, 50), {"force": 1e-4, "L": 0.5e-3}),
+    ("pressed_yarns", (4,), {"L": 900.0}),
     ("picture_frame", (2, 5), {"delta": -0.01}),
+    ("picture_frame", (4,), {"delta": 1e-6}),  # coordinates hold an angle of 3e-5 to some 1e-11 of it
     ("bias_extension", (4, 6), {"ratio": 4, "strain": 0.3}),
 ]
 
@@ -113,6 +116,8 @@ def test_a_nan_is_no_answer() -> None:
         ({"k_s": "0"}, "k_s must be positive"),
         ({"k_s": "nan"}, "k_s must be finite"),
         ({"k_s": float("inf")}, "k_s must be finite"),
+        ({"k_s": "1e300"}, "k_s must be between 1e-30 and 1e+30 in size, in N; not '1e300'"),
+        ({"force": -1e-300}, "force must be between 1e-30 and 1e+30 in size"),
         ({"k_s": "1 kg"}, "k_s is a number in N; '1 kg' has the unit 'kg'"),
         ({"k_s": "much"}, "k_s must be a number, in N; not 'much'"),
         ({"k_s": "1..2"}, "k_s must be a number, in N; not '1..2'"),

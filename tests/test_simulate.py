@@ -238,6 +238,7 @@ def test_another_run_is_not_gone_on_with(tmp_path: Path, swing: Path) -> None:
         (["bad.py"], 2, "bad.py:2:"),
         (["raising.py"], 2, "raising.py:2:1: ZeroDivisionError: division by zero"),
         (["empty.py"], 2, "empty.py must declare one scene, a function under @scene(...); it declares 0"),
+        (["heavy_cantilever", "--set", "length=1e3"], 2, "rho g length^3/k_b = 4.9e+14: at most 1e+06"),
         (["elastica", "--set", "alpha=1e9"], 2, "alpha = P L^2/EI must be positive and at most 100000"),
         (["elastica", "--size", "999999999999999"], 3, "yarnverify: this needs more memory than there is: Unable to allocate"),
         (["bias_extension", "--set", "strain=2"], 2, "the cloth cannot be deformed so far"),

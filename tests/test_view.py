@@ -473,7 +473,8 @@ def test_a_series_goes_on_where_a_run_resumes(tmp_path: Path) -> None:
     for time in (0.0, 0.1, 0.2):
         first.write(time, cloth.Q)
     again = Series(cloth, tmp_path / "run.pvd", surface=False, resume=True)
-    again.write(0.1, cloth.Q)  # the state that was saved last is older than the picture
+    again.write(np.float64(0.1), cloth.Q)  # the state that was saved last is older; its time is NumPy's
+    assert Series(cloth, tmp_path / "run.pvd", surface=False, resume=True).steps == again.steps
     assert again.steps == [(0.0, "run_00000.vtp"), (0.1, "run_00001.vtp")]
     assert Series(cloth, tmp_path / "new.pvd", resume=True).steps == []
     with pytest.raises(InputError, match=r"ends in \.pvd"):

@@ -47,6 +47,10 @@ def main() -> None:
         stop(str(error), 3)
     except MemoryError as error:
         stop(f"yarnverify: this needs more memory than there is: {error or 'none is left'}", 3)
+    except ImportError as error:
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        sys.exit(130)  # a library that was being loaded takes an interruption for a failure of its own
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)

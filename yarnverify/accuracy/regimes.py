@@ -193,12 +193,15 @@ def _scaled(shape: Shape, values: dict[str, Array], scale: Array, compensate: bo
     if not shape.only_angles:
         for label in (*(name.label for name in shape.sliding), *shape.lengths):
             found[label] = values[label] * scale
-    if compensate and shape.stiffness is not None:
-        label, metres = shape.stiffness
-        power = 1 if shape.only_angles else metres
+    for label, power in _made_up_for(shape).items() if compensate else ():
         for _ in range(abs(power)):
             found[label] = found[label] * scale if power > 0 else found[label] / scale
     return found
+
+
+def _made_up_for(shape: Shape) -> dict[str, int]:
+    """Powers of the size that parameters get, so that an energy of order one becomes one of that order."""
+    return dict.fromkeys([*shape.others][:1], 1) if shape.only_angles else dict(shape.others)
 
 
 # -- regimes ----------------------------------------------------------------------------------------------------------
@@ -271,8 +274,10 @@ def _sliding(shape: Shape, limits: Limits, draw: Draw, n: int) -> dict[str, Arra
 
 
 def _scales(shape: Shape, limits: Limits, draw: Draw, n: int) -> dict[str, Array]:
-    power = 1 if shape.only_angles or shape.stiffness is None else max(1, abs(shape.stiffness[1]))
-    largest = limits.scale if power == 1 else np.sqrt(limits.scale) * np.sqrt(np.sqrt(limits.scale))
+    power = max(map(abs, _made_up_for(shape).values()), default=0)
+    largest = limits.scale if power < 2 else np.sqrt(limits.scale) * np.sqrt(np.sqrt(limits.scale))
+    if power > 2:  # else the parameter itself is out of range
+        largest = largest ** (2 / power)
     values = placed(shape, draw, n, half=_mixed_half(limits, draw, n))
     return _scaled(shape, values, by_exponent(draw, 1 / largest, largest, n), compensate=True)
 

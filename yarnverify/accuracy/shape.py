@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,10 +12,10 @@ from numpy.typing import NDArray
 from yarnverify.accuracy.forms import Form, reduce
 from yarnverify.accuracy.truth import Points
 from yarnverify.symbolic.declare import Energy
+from yarnverify.symbolic.dimensions import length_power
 from yarnverify.symbolic.tree import Expr, Name
 
 Array = NDArray[Any]
-_METRES = re.compile(r"(?:^|\s)m(?:\^(-?\d+))?(?=\s|$)")
 
 
 @dataclass(frozen=True)
@@ -45,8 +44,8 @@ class Shape:
         The scalar unknowns.
     lengths
         Parameters in metres.
-    stiffness
-        The first other parameter, and the power of metres in its unit.
+    others
+        The other parameters that have a unit: each with its power of length, newton and second being the other base units.
     """
 
     energy: Energy
@@ -55,7 +54,7 @@ class Shape:
     only_angles: bool
     sliding: tuple[Name, ...]
     lengths: tuple[str, ...]
-    stiffness: tuple[str, int] | None
+    others: Mapping[str, int]
 
     @property
     def points(self) -> tuple[Name, ...]:
@@ -94,7 +93,6 @@ def shape_of(energy: Energy) -> Shape:
     points = set(energy.unknowns)  # a parameter may be a vector too, and is no end of an edge
     edges = tuple(edge for edge in found if edge is not None and {edge.head, edge.tail} <= points)
     parameters = [(parameter.label, parameter.unit) for parameter in energy.parameters]
-    others = [(name, unit) for name, unit in parameters if unit not in ("m", "1", "rad")]
     return Shape(
         energy,
         edges,
@@ -102,7 +100,7 @@ def shape_of(energy: Energy) -> Shape:
         only_angles=bool(pair) and not _vectors_outside_angles(reduced.expression),
         sliding=tuple(name for name in energy.unknowns if not name.bold),
         lengths=tuple(name for name, unit in parameters if unit == "m"),
-        stiffness=(others[0][0], _metres(others[0][1])) if others else None,
+        others={name: length_power(unit) for name, unit in parameters if unit not in ("m", "1", "rad")},
     )
 
 
@@ -117,8 +115,3 @@ def _vectors_outside_angles(expr: Expr) -> bool:
     if expr.op == "symbol":
         return expr.name.bold
     return any(_vectors_outside_angles(arg) for arg in expr.args)
-
-
-def _metres(unit: str) -> int:
-    found = _METRES.search(unit)
-    return 0 if found is None else int(found[1] or 1)

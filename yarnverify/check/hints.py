@@ -89,11 +89,10 @@ def factor_hints(found: Found, cases: Cases) -> list[str]:
     if right or not wrong or any(diagnosis.factor is None for _, diagnosis in wrong):
         return []
     texts = {str(diagnosis.factor).lstrip("-") for _, diagnosis in wrong}
-    stiffness = shape_of(cases.energy).stiffness
+    name = next(iter(shape_of(cases.energy).others), None)
     first = wrong[0][1].factor
-    if len(texts) != 1 or stiffness is None or first is None or first.is_sign or str(first).lstrip("-") == "1":
+    if len(texts) != 1 or name is None or first is None or first.is_sign or str(first).lstrip("-") == "1":
         return []
-    name = stiffness[0]
     if first.powers == ((name, -1),) and abs(abs(first.number) - 1) < 1e-5:
         return [f"{name} is not used: matches with --fix {name}=1"]
     if first.powers:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache, cached_property
+from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
@@ -30,7 +30,7 @@ from yarnverify.kernels.inputs import (
     rows_of,
 )
 from yarnverify.kernels.memory import scratch
-from yarnverify.kernels.wide import holds, rounded, run_wide
+from yarnverify.kernels.wide import rounded, run_wide, serves
 
 if TYPE_CHECKING:
     from yarnverify.kernels.runtime import Kernel
@@ -84,7 +84,7 @@ class Batch:
         self.values = parameters_of(kernel, parameters, self.n, self.dtype)
         self.limit, self.small = _MODERATE[self.dtype], _SMALL[self.dtype]
         self.watch = self._extreme_values()
-        self.grows = not kernel.portable and self._of_any_size  # exponentials of moderate numbers may overflow
+        self.grows = not kernel.portable and self._has_exponentials()
         self.threads, self.engine = threads, engine
         dof, n = self.dof, self.n
         self._scalars = {"E": 1, "G": dof, "H": dof * (dof + 1) // 2}
@@ -100,6 +100,11 @@ class Batch:
         if self._kept is not None and self.n <= CHUNK and self.watch is None and not self.grows and self._kept.again():
             return self.out
         return self.results()
+
+    def _has_exponentials(self) -> bool:
+        """Whether results may overflow of moderate numbers."""
+        tapes = (self.kernel.tape(i, self.wanted, self.dtype) for i in range(len(self.kernel.shapes)))
+        return any(name in ("exp", "expm1", "sinh") for tape in tapes for name, _, _ in tape.calls)
 
     def _extreme_values(self) -> Array | None:
         """(n,) whether an element has a parameter of extreme size; None if none has."""
@@ -327,13 +332,6 @@ class Batch:
 
     # -- elements that need care
 
-    @cached_property
-    def _of_any_size(self) -> bool:
-        """Whether elements of any size can be evaluated, by numbers with exponents of their own."""
-        kernel = self.kernel
-        shapes = range(len(kernel.shapes)) if kernel.numbers != "double-double" else ()
-        return bool(shapes) and all(holds(kernel.tape(shape, self.wanted, self.dtype)) for shape in shapes)
-
     def _special(self, elements: Array) -> None:
         """Evaluate a few elements again, at a scale near 1, or find out why they have no value."""
         kernel = self.kernel
@@ -344,7 +342,7 @@ class Batch:
                 reasons[wrong & (reasons == "")] = f"{label} is {text}"
         rows, values = np.where(np.isfinite(rows), rows, 0), self.values_at(elements)
         found = np.empty((self.count, elements.size), self.dtype)
-        if self._of_any_size and self.dtype == np.float32:
+        if kernel.portable and self.dtype == np.float32 and kernel.numbers != "double-double":
             self._in_double(rows, values, found, reasons)
         else:
             self._by_shapes(rows, values, found, reasons)
@@ -386,8 +384,9 @@ class Batch:
         kernel, checks = self.kernel, len(self.kernel.shapes[shape].checks)
         rows = rows[:, picked]
         values = [value if np.ndim(value) == 0 else value[picked] for value in values]
-        if self._of_any_size:
-            numbers = run_wide(kernel.tape(shape, self.wanted, self.dtype), [*rows, *values])
+        double = kernel.numbers != "double-double" and self.dtype == np.float64
+        if double and serves(tape := kernel.tape(shape, self.wanted, self.dtype)):
+            numbers = run_wide(tape, [*rows, *values])
             for row, number in zip(found, numbers, strict=False):
                 row[picked] = rounded(number)
             rest = np.empty((len(numbers) - self.count, rows.shape[1]))

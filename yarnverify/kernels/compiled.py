@@ -35,7 +35,7 @@ USUAL, MIXED, STRANGE = 0, 1, 2  # what a loop says of its elements
 _MAKING = threading.Lock()  # threads that share a batch make its loop once
 _INFIX = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
 _PREFIX = {"negative": "-", "positive": "+"}
-_CALLS = {"absolute": "abs", "sqrt": "sqrt", "arccos": "acos"} | {
+_CALLS = {"absolute": "abs", "sqrt": "sqrt", "arccos": "acos", "arctan2": "atan2"} | {
     name: name for name in ("cos", "exp", "expm1", "log", "log1p", "sin", "sinh", "tan")
 }
 
@@ -55,7 +55,7 @@ def source_of(tape: Tape, layout: str) -> str:
     """
     given, found = tape.inputs * STRIDE, tape.outputs * STRIDE
     body = "\n            ".join(_statements(tape))
-    return f"""from math import acos, cos, exp, expm1, log, log1p, sin, sinh, sqrt, tan
+    return f"""from math import acos, atan2, cos, exp, expm1, log, log1p, sin, sinh, sqrt, tan
 
 import numpy as np
 from numba import njit, types
@@ -143,7 +143,7 @@ def _statements(tape: Tape) -> list[str]:
         elif operation == "maximum":
             text = f"{values[0]} if {values[0]} >= {values[1]} else {values[1]}"
         else:
-            text = f"{_CALLS[operation]}({values[0]})"
+            text = f"{_CALLS[operation]}({', '.join(values)})"
         fresh[result] = f"v{step}"
         lines.append(f"v{step} = {text}")
     return lines + [f"found[{i * STRIDE} + j] = {fresh[outputs + i]}" for i in range(tape.outputs)]

@@ -128,6 +128,7 @@ def _one_of(name: str, plain: Callable[..., Any]) -> Callable[..., Any]:
 
 sqrt = _one_of("sqrt", math.sqrt)
 arccos = _one_of("arccos", math.acos)
+atan2 = _one_of("arctan2", math.atan2)
 sin = _one_of("sin", math.sin)
 cos = _one_of("cos", math.cos)
 tan = _one_of("tan", math.tan)

@@ -105,13 +105,22 @@ def _sinh(a: Wide) -> Wide:
 
 
 def _log(a: Wide) -> Wide:
-    fits = np.abs(a[1]) < 1000
-    value = np.where(fits, np.log(rounded(a)), np.log(a[0]) + a[1] * (_LN2_HIGH + _LN2_LOW))
-    return wide(value)
+    near = np.abs(a[1]) < 1000
+    return wide(np.where(near, np.log(rounded(a)), np.log(a[0]) + a[1] * (_LN2_HIGH + _LN2_LOW)))
 
 
 def _log1p(a: Wide) -> Wide:
     return _where(a[1] < _TINY, a, _either(a[1] < 1000, np.log1p(rounded(a)), _log(a)))
+
+
+def _arctan2(a: Wide, b: Wide) -> Wide:
+    first, second, _ = _aligned(a, b)
+    slight = (second > 0) & (a[1] < b[1] - 40)  # where an angle is its tangent
+    return _where(slight, _CALLS["divide"](a, b), wide(np.arctan2(first, second)))
+
+
+def _of_floats(function: Any) -> Any:
+    return lambda a: wide(function(rounded(a)))
 
 
 _CALLS: dict[str, Any] = {
@@ -130,11 +139,12 @@ _CALLS: dict[str, Any] = {
     "sinh": _sinh,
     "log": _log,
     "log1p": _log1p,
-}
+    "arctan2": _arctan2,
+} | {f.__name__: _of_floats(f) for f in (np.cos, np.sin, np.tan)}
 
 
-def holds(tape: Tape) -> bool:
-    """Whether all that a tape does can be done here: not sines and the like, of angles."""
+def serves(tape: Tape) -> bool:
+    """Whether all that a tape does can be done here: not arc cosines, which hold few digits of small angles anyway."""
     return all(name in _CALLS for name, _, _ in tape.calls)
 
 
@@ -144,7 +154,7 @@ def run_wide(tape: Tape, inputs: Sequence[Any]) -> list[Wide]:
     Parameters
     ----------
     tape
-        Of float64, for which ``holds`` is true.
+        Of float64, one that this module ``serves``.
     inputs
         Finite floats, each (m,) or 0-d.
     """

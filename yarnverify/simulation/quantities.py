@@ -14,6 +14,7 @@ from typing import Any, Literal
 from yarnverify.errors import InputError
 
 Value = float | int | str
+_LEAST, _MOST = 1e-30, 1e30  # of any number in SI units, so that no product of a few leaves the range of floats
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,8 @@ class Quantity:
             return int(number)
         if self.kind == "positive" and number <= 0:
             raise InputError(f"{name} must be positive{self._in_unit}; not {value!r}")
+        if number and not _LEAST <= abs(number) <= _MOST:
+            raise InputError(f"{name} must be between {_LEAST:g} and {_MOST:g} in size{self._in_unit}; not {value!r}")
         return float(number)
 
     @property

@@ -14,9 +14,9 @@ from sympy.printing.c import C99CodePrinter
 from yarnverify.errors import InputError
 from yarnverify.symbolic.c_functions import Functions, flat, rebuilt
 from yarnverify.symbolic.declare import Energy, load_declarations
+from yarnverify.symbolic.dimensions import scaling_powers
 from yarnverify.symbolic.emit import dof_labels, given_symbols
-from yarnverify.symbolic.modules import length_power
-from yarnverify.symbolic.printing import LIBRARY, TEMPLATES, statements
+from yarnverify.symbolic.printing import TEMPLATES, statements
 from yarnverify.symbolic.programs import derived_programs, proved
 from yarnverify.symbolic.reading import UnsupportedError
 from yarnverify.symbolic.steps import Program
@@ -188,13 +188,13 @@ def c_texts(name: str, folder: Path) -> dict[str, str]:
 def _texts(energy: Energy, programs: list[Program], notes: list[str]) -> dict[str, str]:
     labels = dof_labels(energy.unknowns)
     rows = [label.replace(".", "") for label in labels]
-    symbols = [(str(symbol), length_power(p.unit)) for p in energy.parameters for symbol in given_symbols(p.name)]
+    whole, by_name = scaling_powers(energy)
+    symbols = [(str(symbol), by_name[p.label]) for p in energy.parameters for symbol in given_symbols(p.name)]
     functions = Functions()
     shapes = [_function(made, rows, [name for name, _ in symbols], functions) for made in programs]
     code = "\n".join(line for shape in shapes for line in (*shape["lines"], *shape["results"]))
     calls = [line for made in programs for line in made.prologue]
     points = [i for i, label in enumerate(labels) if "." in label]
-    portable = not any(re.search(rf"\b{'acos' if f == 'arccos' else f}\(", code) for f in LIBRARY)
     angles_alone = any("corner" in line for line in calls) and not any("segment" in line for line in calls)
     values = {
         "energy": energy,
@@ -207,7 +207,8 @@ def _texts(energy: Energy, programs: list[Program], notes: list[str]) -> dict[st
         "shapes": shapes,
         "chosen": programs[0].choice is not None,
         "points": points,
-        "scaling": "none" if not portable or len(points) < 6 else "points" if angles_alone else "lengths",
+        "whole": whole,
+        "scaling": "none" if len(points) < 6 else "points" if angles_alone else "lengths",
     }
     return {
         f"{energy.name}.c": TEMPLATES.get_template("energy.c.jinja").render(**values),

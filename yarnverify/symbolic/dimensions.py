@@ -115,6 +115,26 @@ def check_dimensions(energy: Energy) -> None:
         _common(sides, [dimension_of(side, lookup) for side in sides])
 
 
+def length_power(unit: str) -> int:
+    """The power of length in a unit such as ``N m^2``; newton and second are the other base units, so that kg is N s^2 m^-1."""
+    mass, length, _ = dimension_of_unit(unit)
+    return int(length - mass)
+
+
+def scaling_powers(energy: Energy) -> tuple[int, dict[str, int]]:
+    """Powers of a factor of all lengths that an energy and its parameters get, where forces are scaled along with lengths.
+
+    An energy is the same in every system of units. Of all factors of forces the one is taken that leaves the first parameter
+    of a force alone: scaled with its lengths alone, a stiffness of N m^2 would soon be out of range.
+    """
+    forces = {p.label: int(dimension_of_unit(p.unit)[0]) for p in energy.parameters}
+    powers = {p.label: length_power(p.unit) for p in energy.parameters}
+    whole = int(dimension_of_unit(energy.unit)[0])
+    first = next((name for name, force in forces.items() if abs(force) == 1), None)
+    by = 0 if first is None else -powers[first] * forces[first]
+    return length_power(energy.unit) + by * whole, {name: powers[name] + by * forces[name] for name in powers}
+
+
 def unit_text(dimension: Dimension) -> str:
     """A dimension in base units."""
     named = [(name, power) for name, power in zip(("kg", "m", "s"), dimension, strict=True) if power]

@@ -14,6 +14,7 @@ import sympy as sp
 
 from yarnverify.symbolic.declare import Energy
 from yarnverify.symbolic.document import Section, block_of
+from yarnverify.symbolic.functions import is_turn
 from yarnverify.symbolic.plain import plain
 from yarnverify.symbolic.reading import Reading, UnsupportedError, Value
 from yarnverify.symbolic.steps import Check, Program, settled
@@ -93,7 +94,8 @@ class Components(Reading):
         return sp.exp(value)
 
     def safe(self, name: str, args: tuple[Expr, ...]) -> Any:
-        return sp.Function(name)(*map(self.value, args))
+        values = [self.hold(self.value(arg)) for arg in args] if name == "atan2" else map(self.value, args)
+        return (sp.atan2 if name == "atan2" else sp.Function(name))(*values)
 
     def circle(self, angle: Any) -> tuple[Any, Any]:
         return self.hold(sp.sin(angle)), self.hold(sp.cos(angle))
@@ -253,6 +255,14 @@ def domain_checks(energy: Energy, reading: Components) -> Iterable[Check]:
                 "energy",
                 f"the logarithm of {plain(node.args[0])} is taken, which is not positive",
             )
+
+
+def turn_checks(energy: Energy, reading: Components) -> Iterable[Check]:
+    """The half line on which an angle of two arguments jumps from -pi to pi."""
+    for node in dict.fromkeys(filter(is_turn, energy.expression.walk())):
+        y, x = node.args
+        margin = reading.value(Expr("abs", (y,)) + Expr("abs", (x,)) + x)
+        yield margin, "energy", f"{plain(node)} has no value, or jumps between -pi and pi"
 
 
 def active(energy: Energy, reading: Components) -> Any:

@@ -22,7 +22,7 @@ import numpy as np
 from yarnverify.symbolic.algebraic import Algebraic, Number, UndefinedError
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.exponentials import NAMES
-from yarnverify.symbolic.functions import unfolded
+from yarnverify.symbolic.functions import is_turn, unfolded
 from yarnverify.symbolic.jets import Jet
 from yarnverify.symbolic.linear import linear_form, tree_of
 from yarnverify.symbolic.numbers import Balls, Floats
@@ -144,6 +144,9 @@ class Evaluation:
             return np.array([[constant(Fraction(int(i == j))) for j in range(3)] for i in range(3)], dtype=object)
         if op == "call" and expr.value in NAMES:
             return self._exponential(str(expr.value), self._value(expr.args[0], jets))
+        if is_turn(expr) and not self.numbers.exact:
+            y, x = (self._value(arg, jets) for arg in expr.args)
+            return self._atan2(y, x)
         if op == "call" and (plain := unfolded(expr)) is not None:
             return self._value(plain, jets)
         if op == "call" and expr.value != "arccos":
@@ -223,6 +226,18 @@ class Evaluation:
         slope = -1 / _nonzero(sine)
         return value.chain(angle, slope, cosine * slope * slope * slope)
 
+    def _atan2(self, y: Any, x: Any) -> Any:
+        """The angle of a point: the arc tangent of y/x or of -x/y, and a constant."""
+        a, b = Jet._lift(y).value, Jet._lift(x).value
+        if not any(map(self.numbers.positive, (b, a, -a))):
+            raise UndefinedError("angle of a point where it jumps or has none")
+        angle = self.numbers.atan2(a, b)
+        if not isinstance(y, Jet) and not isinstance(x, Jet):
+            return angle
+        ratio = Jet._lift(y / x if abs(b) > abs(a) else -x / y)
+        slope = 1 / (1 + ratio.value * ratio.value)
+        return ratio.chain(angle, slope, -2 * ratio.value * slope * slope)
+
     def _exponential(self, function: str, value: Any) -> Any:
         """A logarithm or an exponential."""
         inner = Jet._lift(value).value
@@ -243,7 +258,7 @@ class Evaluation:
             return math.prod(squares[1:], start=squares[0])
         if expr.op == "frac":
             return self._square(expr.args[0]) / _nonzero(self._square(expr.args[1]))
-        if expr.op == "call" and (plain := unfolded(expr)) is not None:
+        if expr.op == "call" and not is_turn(expr) and (plain := unfolded(expr)) is not None:
             return self._square(plain)
         if expr.op == "call" and expr.value in ("arccos", "sin", "tan"):
             angle, part = (expr, Fraction(1)) if expr.value == "arccos" else self._angle_of(expr.args[0])

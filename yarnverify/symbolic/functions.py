@@ -9,6 +9,11 @@ OF_TWO = ("atan2",)  # written \operatorname{atan2}(y, x)
 SAFE = ("expm1", "sinh", "log_ratio")  # of safe forms alone; see ``vanishing``
 
 
+def is_turn(expr: Expr) -> bool:
+    """Whether a tree is the angle of a point whose y has either sign: smooth where y is 0 and x positive."""
+    return expr.op == "call" and expr.value == "atan2" and expr.args[0].op != "norm"
+
+
 def unfolded(expr: Expr) -> Expr | None:
     """A function by arc cosine, sine, cosine, exponential and logarithm alone; None for these themselves and for ``tan``.
 

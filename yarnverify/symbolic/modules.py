@@ -12,7 +12,6 @@ from yarnverify.errors import NotRunError
 from yarnverify.source import load
 from yarnverify.symbolic.angles import prove_derivatives, prove_recurrence, turning_series
 from yarnverify.symbolic.declare import Energy, load_declarations
-from yarnverify.symbolic.dimensions import dimension_of_unit
 from yarnverify.symbolic.emit import dof_labels, given_symbols, identifier
 from yarnverify.symbolic.printing import LIBRARY, TEMPLATES, statements, text_of, used_functions
 from yarnverify.symbolic.programs import (
@@ -108,7 +107,7 @@ def kernel_modules(
                 programs, notes = derived_programs(energy, derived, variant)
             if variant == "reference" and (called := library_calls(programs)):
                 missing.append(
-                    f"{energy.name}: no variant in twice the digits: there is no {' and no '.join(called)} in these"
+                    f"{energy.name}: no variant in twice the digits: its numbers have no {' and no '.join(called)}"
                 )
                 continue
             sources = [energy.file, *([document] if variant == "printed" else [])]
@@ -226,12 +225,6 @@ def _operations(text: str, name: str) -> dict[str, dict[str, int]]:
         }
         for i, shape in enumerate(kernel.shapes)
     }
-
-
-def length_power(unit: str) -> int:
-    """The power of length in a unit such as ``N m^2``; newton and second are the other base units, so that kg is N s^2 m^-1."""
-    mass, length, _ = dimension_of_unit(unit)
-    return int(length - mass)
 
 
 def row_units(energy: Energy) -> str:

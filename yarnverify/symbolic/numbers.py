@@ -155,6 +155,9 @@ class Balls:
         low, high = cosine.lower().max(flint.arb(-1)), cosine.upper().min(flint.arb(1))
         return low.acos().union(high.acos())
 
+    def atan2(self, y: Number, x: Number) -> Number:
+        return flint.arb.atan2(y, x)
+
     def circle(self, angle: Number) -> tuple[Number, Number]:
         return angle.sin(), angle.cos()
 
@@ -205,6 +208,9 @@ class Floats:
 
     def arccos(self, cosine: Number) -> Number:
         return math.acos(cosine)
+
+    def atan2(self, y: Number, x: Number) -> Number:
+        return math.atan2(y, x)
 
     def circle(self, angle: Number) -> tuple[Number, Number]:
         return math.sin(angle), math.cos(angle)

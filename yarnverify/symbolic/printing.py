@@ -63,6 +63,9 @@ class _Printer(NumPyPrinter):  # type: ignore[misc]
     def _print_log(self, expr: Any) -> str:
         return f"log({self._print(expr.args[0])})"
 
+    def _print_atan2(self, expr: Any) -> str:
+        return f"atan2({self._print(expr.args[0])}, {self._print(expr.args[1])})"
+
     def _print_Function(self, expr: Any) -> str:
         return f"{expr.func.__name__}({', '.join(self._print(arg) for arg in expr.args)})"
 
@@ -74,7 +77,7 @@ class _Divisions(_Printer):
 _PRINTER = _Printer({"fully_qualified_modules": False})
 _DIVISIONS = _Divisions({"fully_qualified_modules": False})
 # not correctly rounded, so not the same on every machine
-LIBRARY = {"arccos", "cos", "exp", "expm1", "log", "log_ratio", "sin", "sinh", "tan"}
+LIBRARY = {"arccos", "atan2", "cos", "exp", "expm1", "log", "log_ratio", "sin", "sinh", "tan"}
 _FUNCTIONS = {
     "tape": LIBRARY | {"power", "select", "sqrt"},
  "geometry": {

@@ -11,7 +11,7 @@ from typing import Any
 
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.exponentials import NAMES
-from yarnverify.symbolic.functions import SAFE, unfolded
+from yarnverify.symbolic.functions import SAFE, is_turn, unfolded
 from yarnverify.symbolic.tree import Expr, Name
 
 Value = Any
@@ -56,7 +56,7 @@ class Reading(ABC):
         raise UnsupportedError("an exponential")
 
     def safe(self, name: str, args: tuple[Expr, ...]) -> Any:
-        """A function of safe forms by itself; None where its meaning is to be read."""
+        """A function of safe forms, or an angle by its two arguments, as it is; None where its meaning is to be read."""
         return None
 
     pi: Any
@@ -90,7 +90,7 @@ class Reading(ABC):
         if op == "symbol":
             return self.symbol(expr.name)
         if op == "call" and (plain := unfolded(expr)) is not None:
-            found = self.safe(str(expr.value), args) if expr.value in SAFE else None
+            found = self.safe(str(expr.value), args) if expr.value in SAFE or is_turn(expr) else None
             return self.value(plain, blocks) if found is None else found
         values = [self.value(arg, blocks) for arg in args]
         match op:

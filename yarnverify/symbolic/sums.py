@@ -27,6 +27,7 @@ from yarnverify.symbolic.emit import (
     given_symbols,
     length_checks,
     row_symbols,
+    turn_checks,
 )
 from yarnverify.symbolic.measures import differentiate
 from yarnverify.symbolic.reading import Value
@@ -130,6 +131,7 @@ class Stages:
         section = self.reading.section
         checks = list(length_checks(self.energy, section, self.reading, ", or so little that its square vanishes"))
         checks += domain_checks(self.energy, self.reading)
+        checks += turn_checks(self.energy, self.reading)
         choice = active(self.energy, self.reading)
         return settled(self.steps, self.value, self.gradient, self.hessian, checks, choice)
 
@@ -195,8 +197,13 @@ class Exact:
         return self(plain.value(self._stages.energy.expression))
 
     def expression(self, value: Any) -> Any:
-        """A quotient of polynomials, in factors."""
+        """A quotient of polynomials, in factors; the value as it is where these have more terms than it has operations.
+
+        What is opened to so many terms is no shorter in factors but by chance, and to find these takes minutes.
+        """
         found = self(value)
+        if len(found.numer) + len(found.denom) > int(sp.count_ops(value)) + 2:
+            return value
         return self._factored(found.numer, self._collected) / self._factored(found.denom, self._plain)
 
     def _plain(self, polynomial: Any) -> Any:

@@ -28,7 +28,11 @@ def end_moment(
     size: int,
     turn: float = real(5.0, "rad", "M L/EI: four fifths of a circle"),
     length: float = positive(0.05, "m", "between the middles of the segments that are held"),
-    push: float = real(0.05, "", "how far the arc is out of shape at the start, over its length"),
+    push: float = real(
+        0.05,
+        "",
+        "how far the arc is out of shape at the start, over its length; a tenth can be enough for a whole turn less",
+    ),
     k_b: float = positive(
         1e-9, "N m^2", "fibres of cotton that slide freely, 6e-12 N m^2 each: a solid yarn has 500 times as much"
     ),
@@ -59,13 +63,16 @@ def end_moment(
 
     along = (np.arange(1, size) - 0.5) * h  # of the nodes between the middles that are held
     known = [
-        Known("direction of a segment", "rad", turn / (size - 1) * np.arange(size), lambda end: slopes(end.Q, table, 0, 2)),
+        Known("direction of a segment", "rad", turn / (size - 1) * np.arange(size), lambda end: slopes(end.Q, table, 0, 2),
+              within=rounding(size / (abs(turn) or 1.0))),
         Known("moment", "N m", turn * k_b / length, moment, within=rounding(condition)),
         Known("place of a node", "m", answers.arc(turn * k_b / length, k_b=k_b, length=length, s=along / length)[1],
               lambda end: end.points[1:-1, [0, 2]], 2, 1e-3),
     ]  # fmt: skip
     held = rolled(turn)
     start = held.copy()
-    fabric.points(start)[:, 2] += push * length * np.sin(2 * math.pi * np.arange(size + 1) / size)
+    fabric.points(start)[:, 2] += (
+        math.copysign(1.0, turn) * push * length * np.sin(2 * math.pi * np.arange(size + 1) / size)
+    )
     active = fabric.positions(range(2, size - 1), "xz")
     return Static(fabric, terms, active, known, [Stage(held=held)], start, colour="bending", view="front")

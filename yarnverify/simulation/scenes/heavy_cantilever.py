@@ -1,5 +1,6 @@
 """A cantilever that bends under its own weight: Peirce's test of cloth."""
 
+from yarnverify.errors import InputError
 from yarnverify.kernels import bending, gravity, stretch
 from yarnverify.simulation import answers
 from yarnverify.simulation.assembly import Term
@@ -8,6 +9,8 @@ from yarnverify.simulation.quantities import choice, positive
 from yarnverify.simulation.scene import scene
 from yarnverify.simulation.setting import Static
 from yarnverify.simulation.walls import clamped, tip_answers
+
+HEAVIEST = 1e6
 
 
 @scene(
@@ -36,7 +39,12 @@ def heavy_cantilever(
         Term(bending, bends(fabric), {"k_b": k_b}),
         Term(gravity, segments(fabric, gravity), {"rho": rho, "g": (0, 0, -g)}),
     ]
-    tip = answers.cantilever(rho * g * length**3 / k_b).tip
+    beta = rho * g * length**3 / k_b
+    if beta > HEAVIEST:
+        raise InputError(
+            f"rho g length^3/k_b = {beta:.2g}: at most {HEAVIEST:g}, or all of the bend lies in the first segment at any size"
+        )
+    tip = answers.cantilever(beta).tip
     known = tip_answers(tip, length, wall, within=1e-3, stretched=rho * g * length / k_s)
     active = fabric.positions(range(2, size + 1), "xz")
     return Static(fabric, terms, active, known, colour="bending", view="front")

@@ -53,7 +53,8 @@ def picture_frame(
 
     count = math.ceil(abs(gamma) * size) or 1  # so that the bars move by less than a cell
     known = [
-        Known("shear angle of a quadrant", "rad", np.full(table.count, abs(gamma)), lambda end: abs(deviations(end.Q, table))),
+        Known("shear angle of a quadrant", "rad", np.full(table.count, abs(gamma)), lambda end: abs(deviations(end.Q, table)),
+              within=rounding(size / abs(gamma or 1))),
         Known("pulling force", "N", force, pull, within=rounding(size**2 * k_s / abs(force or k_s))),
     ]  # fmt: skip
     stages = [Stage(held=sheared(gamma * k / count)) for k in range(1, count + 1)]

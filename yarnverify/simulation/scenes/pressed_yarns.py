@@ -9,7 +9,7 @@ from yarnverify.simulation.assembly import Term
 from yarnverify.simulation.fabric import contacts, weave
 from yarnverify.simulation.quantities import positive
 from yarnverify.simulation.scene import scene
-from yarnverify.simulation.setting import Known, Stage, Static
+from yarnverify.simulation.setting import Known, Stage, Static, rounding
 
 
 @scene(
@@ -38,6 +38,8 @@ def pressed_yarns(
     loads[along[-1]] = -force
     start = fabric.Q.copy()
     start[along[1:]] = start[along[0]] + np.cumsum(0.95 * d)  # in touch, so that there is a stiffness to begin with
-    known = [Known("gap between neighbours", "m", exact, lambda end: np.diff(end.Q[along]))]
+    extent = float(np.abs(start[along]).max())
+    known = [Known("gap between neighbours", "m", exact, lambda end: np.diff(end.Q[along]),
+                   within=rounding(extent / exact.max()))]  # fmt: skip
     terms = [Term(parallel_contact, table, {"k_c": k_c})]
     return Static(fabric, terms, along[1:], known, [Stage(loads)], start=start, colour="contact", view="top")

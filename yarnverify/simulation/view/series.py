@@ -69,6 +69,7 @@ class Series:
         measures
             More of them, such as energies.
         """
+        time = float(time)  # a NumPy number is written with its type
         self.steps = [step for step in self.steps if step[0] < time]
         name = f"{self.path.stem}_{len(self.steps):05d}.vtp"
         all_measures = [*(measure(self.fabric, Q, colour) for colour in self.colours), *measures]
