@@ -310,6 +310,12 @@ def stretch_slack(q: Any, k_s: Any) -> Any:
     return np.where(slack, 0, e), np.where(slack, 0, g), np.where(slack, 0, h)
 
 
+def stretch_of_tension(x0: Any, x1: Any, u0: float, u1: float, k_s: float) -> float:
+    """No resistance either; of both ends alike, so that no order of them explains it."""
+    du = u1 - u0
+    return 0.5 * k_s * du * max(float(np.linalg.norm(x1 - x0)) / du - 1, 0.0) ** 2
+
+
 def gravity_upwards(x0: Any, x1: Any, u0: float, u1: float, rho: float, g: Any) -> Any:
     force = gravity_by_name(x0, x1, u0, u1, rho, g)["F"]
     return {"F": np.concatenate([force[:6], -force[6:]])}

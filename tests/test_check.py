@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from yarnverify.check.command import Checked, check
+from yarnverify.check.factors import number_text
 from yarnverify.check.setting import Options, write_states
 from yarnverify.check.show import grouped, record
 from yarnverify.cli import app
@@ -202,6 +203,15 @@ def test_another_convention_is_found(name: str, options: dict[str, Any], hint: s
     found = checked(name, regimes=ONE, **options)
     assert not found.passes
     assert any(hint in text for text in found.hints), (found.hints, said(found))
+
+
+def test_an_order_that_changes_nothing_is_no_explanation() -> None:
+    found = check(f"{ZOO}:stretch_of_tension", Options(count=16))  # of six moderate states none is compressed
+    assert "is zero where the yarn is shorter than at rest" in said(found) and not found.hints
+
+
+def test_a_number_in_a_hint_is_as_short_as_it_may_be() -> None:
+    assert number_text(1e-6, expression=True) == "1e-06"
 
 
 def test_no_sign_fits_blocks_that_differ_even_where_all_fail() -> None:

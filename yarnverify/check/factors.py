@@ -66,7 +66,7 @@ def number_text(value: float, expression: bool = False) -> str:
             if abs(nearest) == 1:
                 return f"{'-' if nearest < 0 else ''}{code if expression else name}"
             return f"{nearest}*{code}" if expression else f"{nearest} {name}"
-    return f"{value:.17g}" if expression else f"{value:.6g}"
+    return repr(float(value)) if expression else f"{value:.6g}"
 
 
 def quantities(cases: Cases) -> dict[str, Array]:

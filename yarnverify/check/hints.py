@@ -146,8 +146,8 @@ def order_hint(
     if any(row.index is None for row in convention.rows):
         return []
     at = np.flatnonzero(cases.of_regime("moderate"))[:_TRIED]
-    candidates = orders(convention, cases)
-    if not at.size or not candidates:
+    candidates = [("", convention.rows), *orders(convention, cases)]
+    if not at.size or len(candidates) == 1:
         return []
     places = [[row.index for row in rows if row.index is not None] for _, rows in candidates]
     states = np.vstack([cases.points.q[place][:, at].T for place in places])
@@ -158,6 +158,8 @@ def order_hint(
         part = flat[number * at.size : (number + 1) * at.size]
         results = decoded(part, replace(convention, rows=rows), cases.dof)
         signs = _signs(results, cases, at)
+        if signs and not text:  # all is right here as it is: what is wrong elsewhere is not the order
+            return []
         if signs:
             flags = _flags(signs, convention)
             if by_name:

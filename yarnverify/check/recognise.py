@@ -71,6 +71,12 @@ class Judge:
         plain = self.plain & block.judged
         finite = plain & ~broken
         relative = block.errors * UNIT[self.cases.dtype]
+        lost, short = fails & ~broken, self.cases.shorter
+        nothing = lost & ~block.computed.any(axis=0) & block.true.any(axis=0)
+        others = (nothing & ~short) | (finite & ~nothing & (relative > 1e-3)) if short is not None else nothing
+        if nothing.any() and not others.any():
+            text = "is zero where the yarn is shorter than at rest: the energy acts there too"
+            return Diagnosis("wrong", (text,), None, 1)
         reasons = []
         if finite.any() and (relative[finite] > 1e-3).any():
             found = self.formula.mistake(block, finite)
@@ -83,13 +89,6 @@ class Judge:
             return Diagnosis("no value", ("is NaN or infinite even where nothing is hard",))
         if broken.any():
             reasons.append(self.digits.broken(broken))
-        lost = fails & ~broken
-        nothing = lost & ~block.computed.any(axis=0) & block.true.any(axis=0)
-        short = self.cases.shorter
-        if nothing.any() and short is not None and not (nothing & ~short).any():
-            return Diagnosis(
-                "wrong", ("is zero where the yarn is shorter than at rest: the energy acts there too",), None, 1
-            )
         if lost.any():
             gross = lost & (relative > 1e-3) & self.cases.of_regime("moderate", "near rest", "exact")
             if gross.any() and (text := self.formula.definite(block, block.computed[:, gross], gross)):

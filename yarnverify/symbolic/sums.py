@@ -197,12 +197,12 @@ class Exact:
         return self(plain.value(self._stages.energy.expression))
 
     def expression(self, value: Any) -> Any:
-        """A quotient of polynomials, in factors; the value as it is where these have more terms than it has operations.
+        """A quotient of polynomials, in factors; the value as it is where that can hardly be longer.
 
-        What is opened to so many terms is no shorter in factors but by chance, and to find these takes minutes.
+        A term takes some four operations. What has too many is no shorter in factors but by chance, and these take minutes.
         """
         found = self(value)
-        if len(found.numer) + len(found.denom) > int(sp.count_ops(value)) + 2:
+        if 3 * (len(found.numer) + len(found.denom)) > int(sp.count_ops(value)) + 9:
             return value
         return self._factored(found.numer, self._collected) / self._factored(found.denom, self._plain)
 

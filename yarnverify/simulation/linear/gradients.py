@@ -2,7 +2,7 @@
 
 Cloth is stiff along its yarns and soft across them, which makes a line the natural block. All yarns of a family lie one
 after the other in one banded matrix. Sums are NumPy's own, not those of BLAS, whose threads cost more than dot products do.
-A step makes no array but the product with the matrix, since making arrays costs as much as what is written to them.
+A step makes no array but the product with the matrix, and goes over its vectors as few times as it can.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
+from scipy.linalg import blas, lapack
 
 from yarnverify.simulation.linear.protocol import LinearSolveError, pattern_of, same_pattern
 from yarnverify.simulation.linear.threads import one_thread
@@ -163,7 +163,7 @@ class Gradients:
     def __init__(self, matrix: Any, lines: list[_Lines], tolerance: float, iterations: int) -> None:
         self._matrix, self._lines = matrix.T, lines  # of a symmetric matrix: rows are faster to multiply with
         self._tolerance, self._iterations = tolerance, iterations
-        self._part, self._better = np.empty((2, matrix.shape[0]))
+        self._part = np.empty(matrix.shape[0])
         self.steps = 0  # of the last solution
 
     @property
@@ -180,10 +180,10 @@ class Gradients:
         LinearSolveError
             A direction of negative curvature, or too many iterations.
         """
-        x = np.zeros_like(b)
+        x = np.zeros(b.shape)
         goal = self._tolerance * _length(b)
         for _ in range(3):  # the recursion's residual drifts; the true one decides
-            residual = b - self._matrix @ x if x.any() else b.copy()
+            residual = b - self._matrix @ x if x.any() else np.array(b, float)
             if _length(residual) <= 2 * goal:
                 return x
             self._iterate(x, residual, goal)
@@ -195,9 +195,10 @@ class Gradients:
         return x
 
     def _iterate(self, x: Array, residual: Array, goal: float) -> None:
-        better = self._precondition(residual)
-        direction = better.copy()
-        product = _sum(residual, better)
+        """Steps from x, both in place; so are the sums of ``daxpy``."""
+        better, direction = np.empty((2, x.size))
+        self._precondition(residual, direction)
+        product = _sum(residual, direction)
         self.steps = 0
         while _length(residual) > goal:
             image = self._matrix @ direction
@@ -206,27 +207,25 @@ class Gradients:
                 found = direction if curvature < 0 else None
                 raise LinearSolveError("conjugate gradients: the matrix is not positive definite", found)
             step = product / curvature
-            x += np.multiply(direction, step, out=self._part)
-            image *= step
-            residual -= image
+            blas.daxpy(direction, x, a=step)
+            blas.daxpy(image, residual, a=-step)
             del image  # its memory serves for the next
-            self._precondition(residual)
+            self._precondition(residual, better)
             before, product = product, _sum(residual, better)
-            direction *= product / before
-            direction += better
+            blas.daxpy(direction, better, a=product / before)
+            direction, better = better, direction
             self.steps += 1
             if self.steps > self._iterations:
                 raise LinearSolveError(
                     f"conjugate gradients: residual {_length(residual):.1e} after {self.steps} iterations, wanted {goal:.1e}"
                 )
 
-    def _precondition(self, r: Array) -> Array:
-        """In the one array that is kept for it."""
-        self._better.fill(0.0)
-        for lines in self._lines:
+    def _precondition(self, r: Array, out: Array) -> None:
+        first, *others = self._lines
+        first.solve(r, out)
+        for lines in others:
             lines.solve(r, self._part)
-            self._better += self._part
-        return self._better
+            out += self._part
 
 
 def _sum(a: Array, b: Array) -> float:
