@@ -238,6 +238,9 @@ def test_another_run_is_not_gone_on_with(tmp_path: Path, swing: Path) -> None:
         (["bad.py"], 2, "bad.py:2:"),
         (["raising.py"], 2, "raising.py:2:1: ZeroDivisionError: division by zero"),
         (["empty.py"], 2, "empty.py must declare one scene, a function under @scene(...); it declares 0"),
+        (["unnamed.py"], 2, "unnamed.py:5:1: t: NameError: name 'missing' is not defined"),
+        (["nothing.py"], 2, "t must return Static(...) or Moving(...); it returns NoneType"),
+        (["still_cloth", "--set", "steps=1e300"], 2, "still_cloth: steps must be at most 1e+09; not '1e300'"),
         (["heavy_cantilever", "--set", "length=1e3"], 2, "rho g length^3/k_b = 4.9e+14: at most 1e+06"),
         (["elastica", "--set", "alpha=1e9"], 2, "alpha = P L^2/EI must be positive and at most 100000"),
         (["elastica", "--size", "999999999999999"], 3, "yarnverify: this needs more memory than there is: Unable to allocate"),
@@ -249,7 +252,9 @@ def test_one_clear_error(
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
-    for name, text in (("bad", "x = 1\ndef"), ("raising", "x = 1\n1 / 0"), ("empty", ""), ("file", "")):
+    head = "from yarnverify.simulation.scene import scene\n\n@scene(title='', size='', sizes=(1, 2, 3))\ndef t(size: int):\n"
+    scenes = [("unnamed", head + "    return missing"), ("nothing", head + "    return None")]
+    for name, text in (("bad", "x = 1\ndef"), ("raising", "x = 1\n1 / 0"), ("empty", ""), ("file", ""), *scenes):
         Path(f"{name}.{'txt' if name == 'file' else 'py'}").write_text(text, encoding="utf-8")
     ended, out, err = caller(monkeypatch, capsys)("simulate", *arguments)
     assert ended == status and message in err, err

@@ -18,6 +18,7 @@ from yarnverify.accuracy.metrics import measure
 from yarnverify.accuracy.truth import Points, truth
 from yarnverify.errors import NotRunError
 from yarnverify.export.command import export
+from yarnverify.kernels import wide
 from yarnverify.symbolic import vanishing
 from yarnverify.symbolic.declare import Declarations, Energy, load_declarations
 from yarnverify.symbolic.modules import module_text
@@ -207,3 +208,49 @@ def test_c_source_with_these_functions_is_held_to_golden_vectors(folder: Path, t
     subprocess.run(words, cwd=tmp_path, check=True)
     done = subprocess.run([tmp_path / "golden"], capture_output=True, text=True)
     assert done.returncode == 0 and "states: 0 wrong" in done.stdout, done.stdout
+
+
+# -- any size ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "given"),
+    [
+        ("fibre", 2.0**17, {"k": 1.0, "a": 2.0**15, "L": 1.75 * 2.0**16}),  # 1e290 times what overflows on the way
+        ("fibre", 1e-190, {"k": 1e-200, "a": 2.0, "L": 1.1e-190}),
+        ("hencky", 1e-190, {"k": 1e-30, "L": 1.3e-190}),
+        ("hencky", 1e180, {"k": 1e100, "L": 1e-150}),  # a ratio that no float holds
+        ("morse", 3e160, {"k": 1.0, "a": 1e-160, "L": 2e160}),
+        ("morse", 1e-170, {"k": 1.0, "a": 1e20, "L": 1.5e-170}),  # exp(x) - 1 of 1e-150, squared
+    ],
+)
+def test_lengths_of_any_size(kernels: Any, name: str, size: float, given: dict[str, float]) -> None:
+    energy, module = kernels(name, "accurate")
+    direction = np.array([0.6, 0.0, 0.8])[:, None]
+    points = Points(np.vstack([np.zeros((3, 1)), size * direction]), {key: np.array([v]) for key, v in given.items()})
+    exact = truth(energy, points)
+    found = module["evaluate"](points.q, **points.parameters)
+    for output, value in zip("EGH", found, strict=True):
+        errors = measure(output, value, exact, energy.unknowns, "float64").normwise[:, 0]
+        allowed = 16 + 8 * (
+            condition(output, energy, points, exact) if output != "H" else condition("G", energy, points, exact)
+        )
+        assert (np.isnan(errors) | (errors <= allowed.max())).all(), (output, errors)  # NaN: beyond what floats hold
+
+
+@np.errstate(all="ignore")  # as kernels have it
+@pytest.mark.parametrize("name", ["exp", "expm1", "sinh", "log", "log1p"])
+def test_functions_of_numbers_of_any_size(name: str) -> None:
+    """Against mpmath, and with the very bits of NumPy where floats do."""
+    exponents = np.r_[-3000:3000:37, -60:11] if name in ("log", "log1p") else np.r_[-3000:-60:37, -60:17]
+    mantissas = np.random.default_rng(7).uniform(0.5, 1, exponents.size)
+    signs = (1, -1) if name in ("exp", "expm1", "sinh") else (1,)
+    for sign in signs:
+        mantissa, exponent = wide._CALLS[name]((sign * mantissas, exponents))
+        with mpmath.workdps(1000):
+            for m, e, a, b in zip(mantissas, exponents, mantissa, exponent, strict=True):
+                true = getattr(mpmath, name)(mpmath.ldexp(mpmath.mpf(sign * m), int(e)))
+                if true != 0:
+                    assert abs(mpmath.ldexp(mpmath.mpf(float(a)), int(b)) / true - 1) < 4 * 2.0**-53, (m, e)
+        x = np.ldexp(sign * mantissas, exponents.clip(-90, 9).astype(np.int32))
+        assert (wide.rounded(wide._CALLS[name](wide.wide(x))) == getattr(np, name)(x)).all()

@@ -84,6 +84,7 @@ class Batch:
         self.values = parameters_of(kernel, parameters, self.n, self.dtype)
         self.limit, self.small = _MODERATE[self.dtype], _SMALL[self.dtype]
         self.watch = self._extreme_values()
+        self.grows = not kernel.portable and self._has_exponentials()
         self.threads, self.engine = threads, engine
         dof, n = self.dof, self.n
         self._scalars = {"E": 1, "G": dof, "H": dof * (dof + 1) // 2}
@@ -96,9 +97,14 @@ class Batch:
     def again(self) -> list[Array]:
         """The outputs for what the rows hold by now, which must be the caller's own array of this kind, not a copy."""
         self.reasons.clear()
-        if self._kept is not None and self.n <= CHUNK and self.watch is None and self._kept.again():
+        if self._kept is not None and self.n <= CHUNK and self.watch is None and not self.grows and self._kept.again():
             return self.out
         return self.results()
+
+    def _has_exponentials(self) -> bool:
+        """Whether results may overflow of moderate numbers."""
+        tapes = (self.kernel.tape(i, self.wanted, self.dtype) for i in range(len(self.kernel.shapes)))
+        return any(name in ("exp", "expm1", "sinh") for tape in tapes for name, _, _ in tape.calls)
 
     def _extreme_values(self) -> Array | None:
         """(n,) whether an element has a parameter of extreme size; None if none has."""
@@ -282,6 +288,9 @@ class Batch:
     def _strange(self, margins: Array, where: Where) -> Array | None:
         """Elements that are not as tame as nearly all are; None if there are none."""
         watch = None if self.watch is None else self.watch[where]
+        if self.grows:
+            over = np.asarray(~np.isfinite(self.targets(where)).all(axis=0))
+            watch = over if watch is None else watch | over
         if self.within(margins):
             return watch
         strange = ~((margins > 1 / self.limit) & (margins < self.limit)).all(axis=0)

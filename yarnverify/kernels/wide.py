@@ -73,9 +73,44 @@ def _sqrt(a: Wide) -> Wide:
     return _normal(np.sqrt(np.ldexp(a[0], odd.astype(np.int32))), (a[1] - odd) // 2)
 
 
+_LN2_HIGH, _LN2_LOW = float.fromhex("0x1.62e42feep-1"), float.fromhex("0x1.a39ef35793c76p-33")
+_TINY, _LARGE = -100, 700.0  # an exponent below which sinh x = x; an argument beyond which exp x might not fit
+
+
+def _either(chosen: Array, value: Array, otherwise: Wide) -> Wide:
+    """A function as floats have it where that serves."""
+    return _where(chosen, wide(np.where(chosen, value, 0.0)), otherwise)
+
+
+def _exp(a: Wide) -> Wide:
+    x = rounded(a)
+    power = np.clip(np.rint(x / (_LN2_HIGH + _LN2_LOW)), -(2.0**20), 2.0**20)  # far beyond what fits, either way
+    rest = np.clip((x - power * _LN2_HIGH) - power * _LN2_LOW, -1, 1)
+    mantissa, exponent = wide(np.exp(rest))
+    return _either(
+        np.abs(x) <= _LARGE, np.exp(np.clip(x, -_LARGE, _LARGE)), (mantissa, exponent + power.astype(np.int64))
+    )
+
+
+def _expm1(a: Wide) -> Wide:
+    x = np.clip(rounded(a), -_LARGE, _LARGE)
+    return _where(a[1] < _TINY, a, _either(np.abs(rounded(a)) <= _LARGE, np.expm1(x), _subtract(_exp(a), wide(1.0))))
+
+
+def _sinh(a: Wide) -> Wide:
+    x = np.clip(rounded(a), -_LARGE, _LARGE)
+    mantissa, exponent = _exp((np.abs(a[0]), a[1]))
+    large = np.copysign(mantissa, a[0]), exponent - 1
+    return _where(a[1] < _TINY, a, _either(np.abs(rounded(a)) <= _LARGE, np.sinh(x), large))
+
+
 def _log(a: Wide) -> Wide:
     near = np.abs(a[1]) < 1000
-    return wide(np.where(near, np.log(rounded(a)), np.log(a[0]) + a[1] * np.log(2.0)))
+    return wide(np.where(near, np.log(rounded(a)), np.log(a[0]) + a[1] * (_LN2_HIGH + _LN2_LOW)))
+
+
+def _log1p(a: Wide) -> Wide:
+    return _where(a[1] < _TINY, a, _either(a[1] < 1000, np.log1p(rounded(a)), _log(a)))
 
 
 def _arctan2(a: Wide, b: Wide) -> Wide:
@@ -99,9 +134,13 @@ _CALLS: dict[str, Any] = {
     "sqrt": _sqrt,
     "maximum": _maximum,
     "select": _select,
+    "exp": _exp,
+    "expm1": _expm1,
+    "sinh": _sinh,
     "log": _log,
+    "log1p": _log1p,
     "arctan2": _arctan2,
-} | {f.__name__: _of_floats(f) for f in (np.cos, np.exp, np.expm1, np.log1p, np.sin, np.sinh, np.tan)}
+} | {f.__name__: _of_floats(f) for f in (np.cos, np.sin, np.tan)}
 
 
 def serves(tape: Tape) -> bool:

@@ -14,6 +14,7 @@ from typing import Any, Literal
 from yarnverify.errors import InputError
 
 Value = float | int | str
+_COUNT = 1e9
 _LEAST, _MOST = 1e-30, 1e30  # of any number in SI units, so that no product of a few leaves the range of floats
 
 
@@ -58,6 +59,8 @@ class Quantity:
         if self.kind == "whole":
             if number != int(number) or number < self.least:
                 raise InputError(f"{name} must be a whole number, at least {self.least}; not {value!r}")
+            if number > _COUNT:
+                raise InputError(f"{name} must be at most {_COUNT:g}; not {value!r}")
             return int(number)
         if self.kind == "positive" and number <= 0:
             raise InputError(f"{name} must be positive{self._in_unit}; not {value!r}")

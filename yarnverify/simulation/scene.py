@@ -10,12 +10,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+from traceback import walk_tb
 from typing import Any
 
 from yarnverify.errors import InputError
 from yarnverify.kernels import ElementError
 from yarnverify.simulation.quantities import Quantity, Value, quantities_of
-from yarnverify.simulation.setting import Setting
+from yarnverify.simulation.setting import Moving, Setting, Static
 
 SOLVERS = ("direct", "superlu")
 
@@ -109,11 +110,18 @@ class Scene:
             )
         values = self.values(given)
         try:
-            return self.build(size, **values)
+            found: Any = self.build(size, **values)
         except InputError as error:
             raise InputError(f"{self.name}: {error}") from None
         except (ElementError, ValueError, OverflowError, ZeroDivisionError) as error:
             raise InputError(f"{self.name} at size {size} cannot be built with these parameters: {error}") from None
+        except (NameError, AttributeError, TypeError, LookupError) as error:
+            own = self.build.__code__.co_filename
+            line = [at for frame, at in walk_tb(error.__traceback__) if frame.f_code.co_filename == own][-1]
+            raise InputError(f"{self.name}: {type(error).__name__}: {error}", (own, line, 1)) from error
+        if not isinstance(found, Static | Moving):
+            raise InputError(f"{self.name} must return Static(...) or Moving(...); it returns {type(found).__name__}")
+        return found
 
     def lines(self, given: Mapping[str, Any] | None = None, solver: str | None = None) -> list[Line]:
         """The ways to solve it that are compared: one, where the parameter that is compared or the solver is given."""
