@@ -83,6 +83,19 @@ def test_it_fits_the_screen(opened: tuple[str, Any, list[str]]) -> None:
     assert outside == 0
 
 
+def test_a_formula_that_is_too_long_scrolls_by_itself(opened: tuple[str, Any, list[str]]) -> None:
+    page = opened[1]
+    found = page.evaluate(
+        """() => { const seen = [...document.querySelectorAll('.derivation .formula')].find(
+               each => each.getClientRects().length);
+             const long = seen.appendChild(document.createElement('span'));
+             long.style.cssText = 'display: inline-block; width: 3000px';
+             const right = long.getBoundingClientRect().right, whole = document.documentElement.scrollWidth;
+             long.remove(); return [right > innerWidth, whole <= innerWidth] }"""
+    )
+    assert found == [True, True]
+
+
 def test_accessible(opened: tuple[str, Any, list[str]]) -> None:
     """Contrast, names, alternative texts, headings, landmarks, tables, sizes of targets, by axe."""
     name, page, _ = opened
