@@ -88,8 +88,12 @@ def test_a_damaged_kernel_is_shown_and_not_touched(
     assert not settle_files(tmp_path, modules.texts, True, [], "").differs
 
 
-def test_missing_and_stale_files(tmp_path: Path) -> None:
-    assert settle_files(tmp_path, {"a.py": "x\n"}, True, [], "again").lines[0] == "a.py: is missing"
+def test_missing_and_stale_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Named as one would name them here."""
+    assert settle_files(tmp_path, {"a.py": "x\n"}, True, [], "again").lines[0] == f"{tmp_path / 'a.py'}: is missing"
+    monkeypatch.chdir(tmp_path.parent)
+    found = settle_files(tmp_path, {"a.py": "x\n"}, True, [], "again").lines[0]
+    assert found == f"{tmp_path.name}/a.py: is missing"
     (tmp_path / "old.py").write_text("", encoding="utf-8")
     assert settle_files(tmp_path, {}, True, ["old.py"], "again").differs
     assert not settle_files(tmp_path, {}, False, ["old.py"], "again").differs

@@ -46,6 +46,12 @@ def _sync(folder: Path) -> None:
             os.close(handle)
 
 
+def as_seen(path: Path) -> Path:
+    """A path as one would write it here: from the working folder, where it lies in that."""
+    full = path.resolve()
+    return full.relative_to(Path.cwd()) if full.is_relative_to(Path.cwd()) else path
+
+
 def write_text(text: str, path: Path) -> None:
     """Write a text in UTF-8, whole or not at all."""
     with whole(path) as part:

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from yarnverify.files import as_seen
 from yarnverify.library import declared_files, known
 from yarnverify.project import Project, project
 
@@ -47,30 +48,33 @@ def settle_files(folder: Path, texts: dict[str, str], check: bool, stale: list[s
     outcome = Outcome()
     for name, text in texts.items():
         path = folder / name
+        seen = as_seen(path)
         old = path.read_bytes().decode("utf-8", "replace") if path.is_file() else None
         if old == text:
             continue
         if check:
             outcome.differs = True
             if old is None:
-                outcome.lines.append(f"{name}: is missing")
+                outcome.lines.append(f"{seen}: is missing")
                 continue
             shown = difflib.unified_diff(
-                old.splitlines(), text.splitlines(), f"{name} (file)", f"{name} (generated)", lineterm=""
+                old.splitlines(), text.splitlines(), f"{seen} (file)", f"{seen} (generated)", lineterm=""
             )
-            outcome.lines += list(shown) or [f"{name}: line endings differ"]
+            outcome.lines += list(shown) or [f"{seen}: line endings differ"]
             continue
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(text.encode("utf-8"))
         except OSError as error:
             raise NotRunError(f"{path}: cannot write: {why(error)}") from None
-        outcome.lines.append(f"{name}: written")
+        outcome.lines.append(f"{seen}: written")
     for name in stale:
         outcome.differs |= check
         if not check:
             (folder / name).unlink()
-        outcome.lines.append(f"{name}: {'belongs to nothing' if check else 'removed: belonged to nothing'}")
+        outcome.lines.append(
+            f"{as_seen(folder / name)}: {'belongs to nothing' if check else 'removed: belonged to nothing'}"
+        )
     if check and outcome.differs:
         outcome.lines.append(f"Files differ from what the derivations give; to write them: {again}")
     elif not outcome.lines:

@@ -112,7 +112,14 @@ class Setting:
         base = self.cases.values()
         found: dict[str, Any] = dict(base)
         for name, text in self.given.items():
-            value = evaluated(text, {**found, **base}, f"--with {name}")
+            try:
+                value = evaluated(text, {**found, **base}, f"--with {name}")
+            except InputError as error:
+                if name in base:
+                    raise InputError(
+                        f"{error}; write an argument of yours on the left: {name} is the energy's"
+                    ) from None
+                raise
             found[name] = np.broadcast_to(value, (3, len(self.cases)) if np.ndim(value) == 2 else (len(self.cases),))
         for row in self.rows:
             if row.index is None and row.label not in found:
