@@ -21,10 +21,10 @@ from yarnverify.library import MAIN_DOCUMENT
 from yarnverify.symbolic.court import Verdict
 from yarnverify.symbolic.declare import Declarations, Energy, Point, Positive, Sliding, Vector, energy, length
 from yarnverify.symbolic.derive import declared_section
-from yarnverify.symbolic.dimensions import DimensionError, check_dimensions, dimension_of_unit, unit_text
+from yarnverify.symbolic.dimensions import DimensionError, check_dimensions, dimension_of_unit, length_power, unit_text
 from yarnverify.symbolic.integrals import integral
 from yarnverify.symbolic.invariants import prove_invariants
-from yarnverify.symbolic.modules import kernel_modules, length_power
+from yarnverify.symbolic.modules import kernel_modules
 from yarnverify.symbolic.programs import proved
 from yarnverify.symbolic.sums import Exact, Stages
 from yarnverify.symbolic.tree import Expr, symbol
