@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 ALONE = 4  # elements up to which Python floats cost less than arrays
 FEW = 512  # elements up to which a call costs more than its arithmetic, and is prepared where it is made again
 
-Evaluator: TypeAlias = Callable[[Array, list[Any], list[Array]], tuple[Array, Array]]
+Evaluator: TypeAlias = Callable[[Array, list[Any], list[Array]], tuple[Array, Array, bool]]
 
 
 class Arrays:
@@ -31,7 +31,7 @@ class Arrays:
     def _by_second(self) -> Evaluator:
         return self._batch.evaluator(1)
 
-    def first(self, where: slice) -> tuple[Array, Array]:
+    def first(self, where: slice) -> tuple[Array, Array, bool]:
         batch = self._batch
         found = self._by_first(batch.rows[:, where], batch.values_at(where), batch.targets(where))
         batch.mirror(where)
@@ -46,7 +46,7 @@ class Arrays:
                 batch.scatter(at, values)
                 return values[batch.count : batch.count + checks]
         part = scratch("results", batch.count, at.size, batch.dtype)
-        margins, _ = self._by_second(batch.rows.take(at, axis=1), batch.values_at(at), list(part))
+        margins, _, _ = self._by_second(batch.rows.take(at, axis=1), batch.values_at(at), list(part))
         batch.scatter(at, part)
         return margins
 

@@ -50,8 +50,8 @@ Where: TypeAlias = slice | Array
 class Worker(Protocol):
     """What evaluates elements into the outputs of a batch; one a thread."""
 
-    def first(self, where: slice) -> tuple[Array, Array]:
-        """Evaluate a range by the first shape; its margins (checks, m) and choice (0 or 1, m)."""
+    def first(self, where: slice) -> tuple[Array, Array, bool]:
+        """Evaluate a range by the first shape; its margins (checks, m), choice (0 or 1, m), and whether all inputs are tame."""
 
     def second(self, at: Array) -> Array:
         """Evaluate chosen elements by the second shape; its margins."""
@@ -108,17 +108,22 @@ class Batch:
 
     def _extreme_values(self) -> Array | None:
         """(n,) whether an element has a parameter of extreme size; None if none has."""
-        found = np.zeros(self.n, bool)
+        found: Array | None = None
         for value in self.values:
             size = np.abs(value)
-            found |= ~((size == 0) | ((size > 1 / self.limit) & (size < self.limit)))
-        return found if found.any() else None
+            extreme = ~((size == 0) | ((size > 1 / self.limit) & (size < self.limit)))
+            if extreme.any():
+                found = np.zeros(self.n, bool) if found is None else found
+                found |= extreme
+        return found
 
-    def tame(self, rows: Array) -> bool:
-        """Whether no coordinate is of extreme size, infinite or NaN."""
-        size = np.abs(rows, out=scratch("sizes", self.dof, rows.shape[1], self.dtype))
+    def tame(self, rows: Array, memory: Array | None = None) -> bool:
+        """Whether no coordinate is of extreme size, infinite or NaN; ``memory`` of their shape is written to."""
+        size = np.abs(rows, out=scratch("sizes", self.dof, rows.shape[1], self.dtype) if memory is None else memory)
         if not size.max(initial=0) < self.limit:  # so it is with NaN
             return False
+        if size.min(initial=self.limit) >= self.small:
+            return True
         bits = size.view(f"u{size.itemsize}")  # in the order of the numbers, and less 1 zero is the largest
         bits -= bits.dtype.type(1)
         return bool(bits.min(initial=np.iinfo(bits.dtype).max) >= self.dtype.type(self.small).view(bits.dtype) - 1)
@@ -255,10 +260,10 @@ class Batch:
             later: list[Array] = []
             strange: list[Array] = []
             for where in ranges:
-                margins, choice = worker.first(where)
-                odd, extreme = self._strange(margins, where), self._extreme(where)
-                if extreme is not None:
-                    odd = extreme if odd is None else odd | extreme
+                margins, choice, tame = worker.first(where)
+                odd = self._strange(margins, where)
+                if not tame:
+                    odd = self._extreme(where) if odd is None else odd | self._extreme(where)
                 if choice.size and not np.isfinite(choice).all():
                     odd = ~np.isfinite(choice[0]) if odd is None else odd | ~np.isfinite(choice[0])
                 if odd is not None:
@@ -296,37 +301,38 @@ class Batch:
         strange = ~((margins > 1 / self.limit) & (margins < self.limit)).all(axis=0)
         return np.asarray(strange if watch is None else strange | watch)
 
-    def _extreme(self, where: slice) -> Array | None:
-        """Elements with a coordinate of extreme size, infinite or NaN; None if there are none."""
-        rows = self.rows[:, where]
-        if self.tame(rows):
-            return None
-        size = np.abs(rows)
+    def _extreme(self, where: slice) -> Array:
+        """Elements with a coordinate of extreme size, infinite or NaN."""
+        size = np.abs(self.rows[:, where])
         return np.asarray(~((size < self.limit) & ((size >= self.small) | (size == 0))).all(axis=0))
 
     def evaluator(self, shape: int) -> Evaluator:
-        """A function that fills targets with the outputs of a shape by NumPy, and gives margins and choice as rows."""
+        """A function that fills targets with the outputs of a shape by NumPy.
+
+        It gives margins and choice as rows, and whether all coordinates are tame.
+        """
         kernel, checks = self.kernel, len(self.kernel.shapes[shape].checks)
         if kernel.numbers == "double-double":
             from yarnverify.kernels.doubledouble import evaluator
 
             pairs = evaluator(kernel.outputs(shape, self.wanted))
 
-            def extra(rows: Array, values: list[Any], targets: list[Array]) -> Array:
-                return pairs(list(rows + 0.0), values, targets)
+            def extra(rows: Array, values: list[Any], targets: list[Array]) -> tuple[Array, bool]:
+                return pairs(list(rows + 0.0), values, targets), self.tame(rows)
         else:
             tape = kernel.tape(shape, self.wanted, self.dtype)
 
-            def extra(rows: Array, values: list[Any], targets: list[Array]) -> Array:
-                memory = scratch("steps", self.dof + tape.scratch, rows.shape[1], self.dtype)
+            def extra(rows: Array, values: list[Any], targets: list[Array]) -> tuple[Array, bool]:
+                memory = scratch("steps", self.dof + max(tape.scratch, self.dof), rows.shape[1], self.dtype)
                 inputs = np.add(rows, 0.0, out=memory[: self.dof])  # -0.0 is 0.0
+                tame = self.tame(inputs, memory[self.dof : 2 * self.dof])  # while they are in the nearest cache
                 rest = np.empty((tape.outputs - len(targets), rows.shape[1]), self.dtype)
-                tape.run([*inputs, *values], [*targets, *rest], memory[self.dof :])
-                return rest
+                tape.run([*inputs, *values], [*targets, *rest], memory[self.dof : self.dof + tape.scratch])
+                return rest, tame
 
-        def run(rows: Array, values: list[Any], targets: list[Array]) -> tuple[Array, Array]:
-            rest = extra(rows, values, targets)
-            return rest[:checks], rest[checks:]
+        def run(rows: Array, values: list[Any], targets: list[Array]) -> tuple[Array, Array, bool]:
+            rest, tame = extra(rows, values, targets)
+            return rest[:checks], rest[checks:], tame
 
         return run
 
@@ -394,7 +400,7 @@ class Batch:
                 row[:] = mantissa
             return rest[:checks], rest[checks:]
         part = np.empty((found.shape[0], rows.shape[1]), self.dtype)
-        margins, choice = self.evaluator(shape)(rows, values, list(part))
+        margins, choice, _ = self.evaluator(shape)(rows, values, list(part))
         found[:, picked] = part
         return margins, choice
 

@@ -43,8 +43,9 @@ _CALLS = {"absolute": "abs", "sqrt": "sqrt", "arccos": "acos", "arctan2": "atan2
 def source_of(tape: Tape, layout: str) -> str:
     """The loop over elements as text, scalar statements in the order of the tape.
 
-    It returns STRANGE if a margin, in the first ``checks`` rows of ``rest``, is not between 1/limit and limit, or a choice, in
-    the others, is not finite; else MIXED if a choice is not positive; else USUAL.
+    It returns STRANGE if a coordinate is neither zero nor of a size from ``small`` to ``limit``, if a margin, in the first
+    ``checks`` rows of ``rest``, is not between 1/limit and limit, or if a choice, in the others, is not finite; else MIXED if a
+    choice is not positive; else USUAL.
 
     Parameters
     ----------
@@ -83,10 +84,10 @@ def write(found, places, out, first, at, count):
 
 @njit(
     [whole(inputs, real[:, ::1], whole, whole, index[::1], whole[:, ::1], outputs, whole[:, ::1], outputs,
-      whole[:, ::1], outputs, real[:, ::1], whole, real)],
+      whole[:, ::1], outputs, real[:, ::1], whole, real, real)],
     nogil=True, error_model="numpy", fastmath=False, cache=True,
 )
-def loop(q, values, first, number, at, places_e, energy, places_g, gradient, places_h, hessian, rest, checks, limit):
+def loop(q, values, first, number, at, places_e, energy, places_g, gradient, places_h, hessian, rest, checks, limit, small):
     tame = same = True
     given = np.zeros({given}, real)
     found = np.empty({found}, real)
@@ -101,6 +102,8 @@ def loop(q, values, first, number, at, places_e, energy, places_g, gradient, pla
             else:
                 row = q[k, first + start:]
                 for j in range(count):
+                    size = abs(row[j])
+                    tame &= (size < limit) & ((size >= small) | (size == 0))
                     given[k * {STRIDE} + j] = row[j] + real(0)
         for k in range(more):
             for j in range(count):
@@ -189,10 +192,10 @@ class Loops:
                 kernel.loops[key] = _load(source_of(kernel.tape(shape, wanted, dtype), self._layout))
             return kernel.loops[key]
 
-    def first(self, where: slice) -> tuple[Array, Array]:
+    def first(self, where: slice) -> tuple[Array, Array, bool]:
         given = self._arguments(0, where, where.start, where.stop - where.start, np.empty(0, np.uint64))
-        self._by_first(*given)
-        return self._margins(given)
+        found = self._by_first(*given)
+        return *self._margins(given), found != STRANGE
 
     def second(self, at: Array) -> Array:
         given = self._arguments(1, at, 0, at.size, at.astype(np.uint64))
@@ -200,8 +203,6 @@ class Loops:
         return self._margins(given)[0]
 
     def again(self) -> bool:
-        if not self._batch.tame(self._batch.rows):
-            return False
         found = self._by_first(*self._whole)
         if found != MIXED:
             return found == USUAL
@@ -223,11 +224,11 @@ class Loops:
             row[:] = value
         outputs = kernel.tape(shape, batch.wanted, batch.dtype).outputs
         rest = np.empty((outputs - batch.count, number), batch.dtype)
-        checks, limit = len(kernel.shapes[shape].checks), batch.dtype.type(batch.limit)
-        return batch.rows, values, first, number, at, *self._outputs, rest, checks, limit
+        sizes = batch.dtype.type(batch.limit), batch.dtype.type(batch.small)
+        return batch.rows, values, first, number, at, *self._outputs, rest, len(kernel.shapes[shape].checks), *sizes
 
     def _margins(self, given: tuple[Any, ...]) -> tuple[Array, Array]:
-        rest, checks, _ = given[-3:]
+        rest, checks, *_ = given[-4:]
         return rest[:checks], rest[checks:]
 
 
