@@ -10,7 +10,7 @@ import pytest
 from tests.cases import FAR, GENERIC, ORIGIN, Case, X, Y, Z, bent, made, sheared, stretched, towards
 from tests.variants import bits, kernel
 from yarnverify.fuzzing.judge import declared, judge
-from yarnverify.kernels import ElementError, batch
+from yarnverify.kernels import ElementError, batch, special
 from yarnverify.strategies import Element
 
 ALL = ("stretch", "bending", "shear", "parallel_contact", "gravity", "kinetic", "plane", "sphere")
@@ -83,7 +83,7 @@ def test_numbers_of_any_size_round_as_floats_do(energy: str, variant: str, monke
     limits = dict.fromkeys(batch._MODERATE, 1.0 + 2.0**-30)
     monkeypatch.setattr(batch, "_MODERATE", limits)
     calls = []
-    monkeypatch.setattr(batch, "run_wide", lambda *a, real=batch.run_wide: calls.append(a) or real(*a))
+    monkeypatch.setattr(special, "run_wide", lambda *a, real=special.run_wide: calls.append(a) or real(*a))
     assert bits(module.evaluate(q, **values)) == bits(usual)
     assert calls
 

@@ -15,7 +15,7 @@ from yarnverify.project import Project, project
 DEFAULT_VARIANT = "accurate"
 WRITTEN_BY_HAND = {
     "__init__.py", "arrays.py", "batch.py", "compiled.py", "doubledouble.py", "geometry.py", "inputs.py", "memory.py",
-    "runtime.py", "tape.py", "wide.py", "words.py",
+    "runtime.py", "special.py", "tape.py", "wide.py", "words.py",
 }  # fmt: skip
 
 

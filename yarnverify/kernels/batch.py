@@ -30,7 +30,7 @@ from yarnverify.kernels.inputs import (
     rows_of,
 )
 from yarnverify.kernels.memory import scratch
-from yarnverify.kernels.wide import rounded, run_wide, serves
+from yarnverify.kernels.special import Special
 
 if TYPE_CHECKING:
     from yarnverify.kernels.runtime import Kernel
@@ -276,7 +276,7 @@ class Batch:
                         later.clear()
             strange += self.second(later, worker)
             for at in _groups(strange):
-                self._special(at)
+                Special(self, at).settle()
 
     def second(self, later: list[Array], worker: Worker) -> list[Array]:
         """Evaluate elements in the second shape, or set them to zero; those of them that need more care."""
@@ -335,80 +335,6 @@ class Batch:
             return rest[:checks], rest[checks:], tame
 
         return run
-
-    # -- elements that need care
-
-    def _special(self, elements: Array) -> None:
-        """Evaluate a few elements again, at a scale near 1, or find out why they have no value."""
-        kernel = self.kernel
-        rows = self.rows.take(elements, axis=1) + 0.0
-        reasons = np.full(elements.size, "", dtype=object)
-        for label, row in zip(kernel.dofs, rows, strict=True):
-            for text, wrong in (("nan", np.isnan(row)), ("inf", row == np.inf), ("-inf", row == -np.inf)):
-                reasons[wrong & (reasons == "")] = f"{label} is {text}"
-        rows, values = np.where(np.isfinite(rows), rows, 0), self.values_at(elements)
-        found = np.empty((self.count, elements.size), self.dtype)
-        if kernel.portable and self.dtype == np.float32 and kernel.numbers != "double-double":
-            self._in_double(rows, values, found, reasons)
-        else:
-            self._by_shapes(rows, values, found, reasons)
-        bad = ~np.isfinite(found).all(axis=0) & (reasons == "")
-        reasons[bad] = f"the result is not finite: it or a value on the way is outside the range of {self.dtype}"
-        self.scatter(elements, found)
-        self.reasons.update((int(elements[i]), str(reasons[i])) for i in np.flatnonzero(reasons != ""))
-
-    def _in_double(self, rows: Array, values: list[Any], found: Array, reasons: Array) -> None:
-        """Single precision's elements in double precision, whose range holds their products."""
-        wider = np.broadcast_arrays(*[np.asarray(value, np.float64) for value in values])
-        given: dict[str, Any] = dict(zip((name for name, _ in self.kernel.parameters), wider, strict=True))
-        for vector in self.kernel.vectors:
-            given[vector] = np.array([given.pop(f"{vector}_{axis}") for axis in "xyz"])
-        batch = Batch(self.kernel, self.wanted, rows.astype(np.float64), given, errors="mask")
-        found[:] = np.vstack(batch.results())
-        for element, reason in batch.reasons.items():
-            if not reason.startswith("the result") and not reasons[element]:
-                reasons[element] = reason
-
-    def _by_shapes(self, rows: Array, values: list[Any], found: Array, reasons: Array) -> None:
-        """Elements of any size, each by the shape that is right for it."""
-        size = rows.shape[1]
-        margins, choice = self._again(0, np.arange(size), rows, values, found)
-        other = ~(choice[0] > 0) if choice.size else np.zeros(size, bool)
-        self._refuse(0, margins, other, reasons, only="energy")  # derivatives are the other shape's affair
-        self._refuse(0, margins, ~other, reasons)
-        other &= reasons == ""
-        if other.any() and len(self.kernel.shapes) == 1:
-            found[:, other] = 0
-        elif other.any():
-            second, _ = self._again(1, np.flatnonzero(other), rows, values, found)
-            everywhere = np.ones((len(second), size), self.dtype)
-            everywhere[:, other] = second
-            self._refuse(1, everywhere, other, reasons)
-
-    def _again(self, shape: int, picked: Any, rows: Array, values: list[Any], found: Array) -> tuple[Array, Array]:
-        """Evaluate chosen columns by a shape into ``found``; of margins and choice the signs are right."""
-        kernel, checks = self.kernel, len(self.kernel.shapes[shape].checks)
-        rows = rows[:, picked]
-        values = [value if np.ndim(value) == 0 else value[picked] for value in values]
-        double = kernel.numbers != "double-double" and self.dtype == np.float64
-        if double and serves(tape := kernel.tape(shape, self.wanted, self.dtype)):
-            numbers = run_wide(tape, [*rows, *values])
-            for row, number in zip(found, numbers, strict=False):
-                row[picked] = rounded(number)
-            rest = np.empty((len(numbers) - self.count, rows.shape[1]))
-            for row, (mantissa, _) in zip(rest, numbers[self.count :], strict=True):
-                row[:] = mantissa
-            return rest[:checks], rest[checks:]
-        part = np.empty((found.shape[0], rows.shape[1]), self.dtype)
-        margins, choice, _ = self.evaluator(shape)(rows, values, list(part))
-        found[:, picked] = part
-        return margins, choice
-
-    def _refuse(self, shape: int, margins: Array, mine: Array, reasons: Array, only: str = "") -> None:
-        """Give the reason of each margin that is not positive, of what is wanted or of ``only`` one kind."""
-        for (needed_by, reason), margin in zip(self.kernel.shapes[shape].checks, margins, strict=True):
-            if needed_by == "energy" or (self.wanted != "E" and not only):
-                reasons[mine & ~(margin > 0) & (reasons == "")] = reason
 
 
 @cache
