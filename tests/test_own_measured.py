@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
 
 from tests.commands import caller
+from yarnverify.accuracy.cells import kernel
 from yarnverify.check.cases import hard_cases
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.export.command import export
@@ -20,7 +22,7 @@ from yarnverify.fuzzing import command as fuzzing
 from yarnverify.fuzzing.search import search
 from yarnverify.generation import generate_kernels
 from yarnverify.project import project
-from yarnverify.strategies import element
+from yarnverify.strategies import Element, element, elements
 
 ENERGIES = """
 from yarnverify.symbolic.declare import *
@@ -40,6 +42,11 @@ def fibre(x0: Point, x1: Point, *, k: Positive["J"], a: Positive["1"], L: Positi
 def toda(x0: Point, x1: Point, *, k: Positive["J"], L: Positive["m"]):
     e = length(x1 - x0) / L - 1
     return k * (exp(e) - 1 - e)
+
+
+@energy
+def turned(x0: Point, x1: Point, x2: Point, *, k: Positive["N m^2"], a: Positive["rad"], b: Real["rad"], L: Positive["m"]):
+    return k * (angle(x1 - x0, x0 - x2) - a - b) ** 2 / (2 * L)
 
 
 @energy
@@ -119,13 +126,28 @@ def test_a_search_draws_vectors_and_lengths_near_the_size(own: Path) -> None:
     assert again.parameters["c"].tolist() == [1.0, 0.0, -1.0] and repr(again).endswith('c="0x1p+0 0x0p+0 -0x1p+0")')
 
 
+def test_an_angle_that_must_be_positive_is_drawn_so(own: Path) -> None:
+    drawn: list[Element] = []
+    found = search("turned", "fast", 60.0, 1, most=200, folder=own)
+    assert found.cases == 200
+    module = kernel("fast", "turned", str(own))
+
+    @settings(max_examples=100)
+    @given(elements(module, units={"a": "rad", "b": "rad"}))
+    def collect(element: Element) -> None:
+        drawn.append(element)
+
+    collect()
+    assert min(e.parameters["a"] for e in drawn) >= 0 > min(e.parameters["b"] for e in drawn)
+
+
 def test_a_search_tells_what_a_kernel_does_not_promise(own: Path, run: Any) -> None:
     lines, (record,) = fuzzing.fuzz("toda", "accurate", 2.0, 1, lambda label, total: None, project(own))
     assert "limit 16 u + 8 u x condition, which it does not promise)" in lines[0]
     assert "error" in {flaw["kind"] for flaw in record["found"]}  # exp(e) - 1 - e loses digits at small e
     assert "accepted" not in {flaw["kind"] for flaw in record["found"]}  # an exponential that overflows is infinite
     status, _, err = run("fuzz", "own/nothing", "--time", "1")
-    assert status == 2 and err == "there is no energy 'nothing'; one of anchor, fibre, signed, toda\n"
+    assert status == 2 and err == "there is no energy 'nothing'; one of anchor, fibre, signed, toda, turned\n"
 
 
 def test_ones_own_energies_are_timed_beside_the_peers(run: Any) -> None:

@@ -117,7 +117,7 @@ def elements(
         Strategy for each parameter; for a vector, of its length.
     units
         Units of parameters by name, where they are known: what is in m is drawn near the size of the element as often as not,
-        and what is in rad between -3 and 3.
+        and what is in rad between -3 and 3, or from 0 if it must be positive.
     dtype
         float64 or float32.
 
@@ -138,6 +138,7 @@ def elements(
     module = _module(kernel)
     points, sliding = _rows(module.DOFS)
     vectors = module.KERNEL.vectors if hasattr(module, "KERNEL") else ()
+    positive = {name for name, sign in module.KERNEL.parameters if sign} if hasattr(module, "KERNEL") else set()
     single = np.dtype(dtype) == np.float32
     turn = turns(smallest=1e-30 if single else 1e-300) if turn is None else turn
     orientation = orientations() if orientation is None else orientation
@@ -161,7 +162,7 @@ def elements(
             if name in vectors:
                 parameters[name] = draw(stiffness) * draw(orientation)[:, 0]
             elif units.get(name) == "rad":
-                parameters[name] = draw(st.floats(-3, 3, width=32 if single else 64))
+                parameters[name] = draw(st.floats(0 if name in positive else -3, 3, width=32 if single else 64))
             elif units.get(name) == "m" and points and draw(st.booleans()):
                 parameters[name] = size * (1 + draw(strain))
             else:
