@@ -141,6 +141,26 @@ def test_an_angle_that_must_be_positive_is_drawn_so(own: Path) -> None:
     assert min(e.parameters["a"] for e in drawn) >= 0 > min(e.parameters["b"] for e in drawn)
 
 
+def test_what_hypothesis_says_of_being_stopped_is_no_error(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stopped within a draw it may find that draws differ; but what it says before the time is up is told."""
+
+    def stopped(progress: Any, number: int) -> None:
+        try:
+            while True:
+                pass
+        except BaseException:
+            raise RuntimeError("draws differ") from None
+
+    def failing(progress: Any, number: int) -> None:
+        raise RuntimeError("a mistake")
+
+    monkeypatch.setattr("yarnverify.fuzzing.search._round", stopped)
+    assert search("anchor", "accurate", -0.9, 1, folder=own).cases == 0
+    monkeypatch.setattr("yarnverify.fuzzing.search._round", failing)
+    with pytest.raises(RuntimeError, match="a mistake"):
+        search("anchor", "accurate", 60.0, 1, folder=own)
+
+
 def test_a_search_tells_what_a_kernel_does_not_promise(own: Path, run: Any) -> None:
     lines, (record,) = fuzzing.fuzz("toda", "accurate", 2.0, 1, lambda label, total: None, project(own))
     assert "limit 16 u + 8 u x condition, which it does not promise)" in lines[0]

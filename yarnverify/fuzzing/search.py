@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 from hypothesis import HealthCheck, Phase, Verbosity, given, seed, settings, target
@@ -176,13 +177,16 @@ def search(
     """
     declaration, module = declared(energy, folder), _kernel(energy, variant, folder)
     progress = _Progress(module, declaration, time.monotonic() + seconds, most, advance)
-    interrupted = False
+    interrupted, rung = False, Event()
     try:
-        with _alarm(seconds + 1):
+        with _alarm(seconds + 1, rung):
             for number in range(2**31):
                 _round(progress, seed_ + number)
     except _Stop:
         pass
+    except Exception:
+        if not rung.is_set():  # stopped in the middle of something of its own, Hypothesis may say something else
+            raise
     except KeyboardInterrupt:
         interrupted = True
     return Search(
@@ -201,17 +205,18 @@ def search(
 
 
 @contextmanager
-def _alarm(seconds: float) -> Iterator[None]:
+def _alarm(seconds: float, rung: Event) -> Iterator[None]:
     """Stop even where Hypothesis has been busy with itself, and has drawn no element, for long; where there are alarms."""
     if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def ring(number: int, frame: Any) -> None:
+        rung.set()
         raise _Stop
 
     before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    signal.setitimer(signal.ITIMER_REAL, seconds, 1.0)  # again: a stop within a callback is lost
     try:
         yield
     finally:
