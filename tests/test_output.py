@@ -210,7 +210,7 @@ PLAIN = [
     (r"\mathbf{a} \times \mathbf{b} - \mathbf{I} \mathbf{c}", "a × b - I c"),
     (r"\mathbf{a} \cdot (-\mathbf{b})", "a · (-b)"),
     (r"\frac{\partial F_{u_1}}{\partial \mathbf{x}_0} V_{0,1}", "∂F_u1/∂x0 V_0,1"),
-    (r"\frac{a b}{c + d} \bar{\theta}_0^{-1}", "(a b / (c + d)) barθ0⁻¹"),
+    (r"\frac{a b}{c + d} \bar{\theta}_0^{-1}", "(a b / (c + d)) bar_θ0⁻¹"),
     (r"\cos (a + b) - (-c)", "cos (a + b) - -c"),
 ]
 
