@@ -85,6 +85,35 @@ def test_every_verdict_of_the_record_is_shown(text: str) -> None:
         assert verdict == ("refuted" if "refuted" in verdicts else "proved")
 
 
+def test_the_table_of_verdicts_adds_up(text: str) -> None:
+    table = text.split('aria-label="Verdicts by section"')[1].split("</table>")[0]
+    rows = [re.findall(r'<td class="number">(\d+)', row) for row in table.split("<tr>")[2:]]
+    *parts, together = [[int(count) for count in row] for row in rows]
+    assert len(parts) == 5  # shared definitions, and four energies
+    assert [sum(column) for column in zip(*parts, strict=True)] == together
+    assert together == [records()["verdicts"]["tally"][verdict] for verdict in ("proved", "refuted")]
+
+
+def test_a_correction_and_its_equation_lead_to_each_other(text: str) -> None:
+    row = text.split('<tr id="equation-18"')[1].split("</tr>")[0]
+    assert 'href="#correction-18"' in row
+    assert 'href="#equation-18"' in text.split('id="correction-18"')[1].split("</h3>")[0]
+    assert 'href="#correction' not in text.split('<tr id="equation-17"')[1].split("</tr>")[0]
+
+
+def test_powers_are_raised_whole(text: str) -> None:
+    assert re.search(r"n<sup>\d\.\d\d</sup>", text)
+    assert not re.search(r"</sup>\.?\d", text)
+
+
+def test_commands_for_energies_of_ones_own_name_them() -> None:
+    found = records() | {"benchmark": None, "accuracy": None, "analysis": None, "simulation": None}
+    text = "".join(read(whole_page(found, name="my_model")).text)
+    commands = re.findall(r"yarnverify (?:prove|derive|generate|accuracy|benchmark|report).*", text)
+    assert "yarnverify benchmark my_model --json my_model/reports/records/benchmark.json" in commands
+    assert all("my_model" in command for command in commands)
+
+
 def test_every_step_of_every_derivation_is_shown(text: str) -> None:
     own = text.split('<section aria-labelledby="derivations">')[1].split("</section>")[0]
     parts = dict(zip(*[iter(re.split(r'<h3 id="derivation-(\w+)">', own)[1:])] * 2, strict=True))
@@ -141,7 +170,7 @@ def test_text_of_a_document_is_no_markup() -> None:
 def test_scenes_show_errors_orders_and_seconds() -> None:
     text = " ".join("".join(read(whole_page(photos={"elastica": b"PNG"})).text).split())
     assert "A hanging yarn, stretched by its own weight" in text
-    assert "Command: yarnverify simulate elastica --out reports/scenes/elastica" in text
+    assert "Command: yarnverify simulate elastica --size 10 20 --out reports/scenes/elastica" in text
     runs = scenes(simulated())[1].runs
     assert runs is not None and runs.headings[:4] == ("wall", "segments", "unknowns", "iterations")
     assert runs.headings[-1] == "seconds" and len(runs.rows) == 4
@@ -154,10 +183,27 @@ def test_results_of_a_gallery_are_shown_without_a_record() -> None:
         for run in line["runs"]:
             run["answers"] = []
     text = whole_page(records() | {"simulation": None}, gallery=[result], photos={"hanging_yarn": b"PNG"})
-    assert "Command: <code>yarnverify simulate hanging_yarn --size 8 --out reports/scenes/hanging_yarn</code>" in text
+    command = "Command: yarnverify simulate hanging_yarn --size 4 8 --out reports/scenes/hanging_yarn"
+    assert command in "".join(read(text).text)
     assert 'alt="The end of the scene: a hanging yarn' in text
     assert "Not compared with known answers: not run." in text
     assert len(scenes(simulated(), [result])) == 2  # the record has it
+
+
+def test_a_picture_of_another_run_says_which() -> None:
+    other = copy.deepcopy(simulated()["scenes"][1]["result"])
+    other["lines"][0]["runs"] = other["lines"][0]["runs"][:1]
+    other["parameters"]["alpha"]["value"] = 2.5
+    drawn = "yarnverify simulate elastica --set alpha=2.5 --size 10 --out reports/scenes/elastica"
+    assert scenes(simulated(), [other])[1].pictured == drawn
+    text = "".join(read(whole_page(gallery=[other], photos={"elastica": b"PNG"})).text)
+    assert f"Drawn by {drawn}" in text
+    same = simulated()["scenes"][1]["result"]
+    assert "Drawn by" not in whole_page(gallery=[same], photos={"elastica": b"PNG"})
+
+
+def test_the_overview_leads_to_every_scene(text: str) -> None:
+    assert {"#scene-hanging-yarn", "#scene-elastica"} <= set(read(text).targets)
 
 
 def test_a_goal_that_was_missed_is_shown() -> None:

@@ -23,7 +23,8 @@ In the order of work::
     measures, laws, scalars     lengths and angles; energies as laws of them; SymPy scalars back to trees
     derive, explain             gradients and Hessians in vector form, proved; the derivation step by step
     corner, safe, safe_laws,    the same blocks rearranged so that they have no 0/0, proved again
-      vanishing, safe_program
+      vanishing, radicals,
+      safe_program
     steps, emit, sums,          reading 3: straight-line programs, also of energies without safe forms; their text,
       vector_angles, printing,    which of them a variant consists of, and the modules that hold them
       programs, modules

@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import flint
-import numpy as np
 
 Number = Any  # flint.fmpq, Algebraic, flint.arb or float
 _FIRST_BITS = 64  # of the balls that tell a sign
@@ -33,8 +32,8 @@ class Algebraic:
         return other if isinstance(other, Algebraic) else Algebraic(self.roots, {0: flint.fmpq(other)})
 
     def __add__(self, other: Number) -> Number:
-        if isinstance(other, np.ndarray):
-            return NotImplemented  # NumPy then works entry by entry
+        if not isinstance(other, _EXACT):
+            return NotImplemented
         parts = dict(self.parts)
         for mask, q in self._lift(other).parts.items():
             parts[mask] = parts.get(mask, 0) + q
@@ -52,7 +51,7 @@ class Algebraic:
         return -self + other
 
     def __mul__(self, other: Number) -> Number:
-        if isinstance(other, np.ndarray):
+        if not isinstance(other, _EXACT):
             return NotImplemented
         total: Number = Algebraic(self.roots, {})
         for m, p in self.parts.items():
@@ -82,6 +81,8 @@ class Algebraic:
         return (low - high * root) * (norm.inverse() if isinstance(norm, Algebraic) else 1 / norm)
 
     def __truediv__(self, other: Number) -> Number:
+        if not isinstance(other, _EXACT):
+            return NotImplemented
         return self * (other.inverse() if isinstance(other, Algebraic) else 1 / flint.fmpq(other))
 
     def __rtruediv__(self, other: Number) -> Number:
@@ -96,6 +97,9 @@ class Algebraic:
 
     def __hash__(self) -> int:
         return hash(tuple(sorted((m, str(q)) for m, q in self.parts.items())))
+
+
+_EXACT = (Algebraic, flint.fmpq, flint.fmpz, int)  # an array and a jet do the arithmetic themselves
 
 
 def approximate(value: Number) -> Any:

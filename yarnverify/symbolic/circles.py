@@ -36,6 +36,7 @@ class Circles:
         self.field = field
         self._angles: list[tuple[Quotient, Quotient]] = []  # (cosine, angle)
         self._cosines: dict[str, Quotient] = {}  # of those angles that are generators
+        self._turns: list[tuple[Quotient, Quotient, Quotient]] = []  # (y, x, angle)
         self._parts: list[tuple[Quotient, Pair]] = []  # other angles, and the points of their fourth parts
 
     @property
@@ -109,6 +110,23 @@ class Circles:
                         angle = angle + field.relations.make(labels[j]) * n
                     return angle / count
         return None
+
+    # -- angles of points
+
+    def turn(self, y: Quotient, x: Quotient) -> Quotient:
+        """The angle of the point (x, y), wherever it is not on the negative axis."""
+        for known_y, known_x, angle in self._turns:
+            if (known_y - y).is_zero and (known_x - x).is_zero:
+                return angle
+
+        def rule(unknown: Name, axis: int) -> Quotient:
+            slope_y, slope_x = (self.field.derivative(value, unknown, axis) for value in (y, x))
+            return (x * slope_y - y * slope_x) / (x * x + y * y)
+
+        label = self.field.atom(rule, lambda place: flint.arb.atan2(place.quotient(y), place.quotient(x)))
+        found = self.field.relations.make(label)
+        self._turns.append((y, x, found))
+        return found
 
     # -- sines and cosines
 

@@ -21,6 +21,7 @@ from yarnverify.symbolic.blocks import Blocks, flat
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.evidence import BALL_BITS, EXACT_STATES, FEW_BITS, Comparison, Evidence, Witness
 from yarnverify.symbolic.forward import Evaluation, entries
+from yarnverify.symbolic.functions import is_turn
 from yarnverify.symbolic.latex import name_latex
 from yarnverify.symbolic.normal import Field
 from yarnverify.symbolic.reading import UnsupportedError
@@ -123,6 +124,20 @@ class Court:
         states = self.evidence.exact
         return bool(states) and not all(any(has_value(e, name) for e in states) for name in self.section.unknowns)
 
+    def _has_turns(self, *trees: Expr) -> bool:
+        return any(is_turn(node) for tree in (*trees, self.energy) for node in self.section.expand(tree).walk())
+
+    @cached_property
+    def _turns(self) -> Blocks:
+        return Blocks(Field(self.section, self.names, self.positive, turns=True), self.energy)
+
+    def _equal_by_turns(self, left: Expr, right: Expr) -> bool:
+        """Whether two trees are equal with the angles of points as they are: their slopes are then free of roots."""
+        try:
+            return self._turns.equal(left, right)
+        except (UnsupportedError, ZeroDivisionError):
+            return False
+
     @cached_property
     def _regions(self) -> dict[int, Blocks]:
         return {}
@@ -189,6 +204,8 @@ class Court:
             if others:
                 compared = self.evidence.compare(left, right, others)
                 refuted = self._refuted(compared, left, right)
+        if refuted is None and equal is not True and not compared.differs and self._has_turns(left, right):
+            equal = self._equal_by_turns(left, right) or equal
         if refuted is None and equal is False and not compared.differs and not self.forms.field.settles:
             equal = self._equal_in_regions(left, right)
         if refuted is not None and not (equal and refuted.witness is not None and refuted.witness.right):

@@ -100,9 +100,9 @@ class Derivation:
         return tuple(dict.fromkeys(s for measure in self.measures for s in measure.segments))
 
     def _is_hub(self, point: Name) -> bool:
-        """Whether every segment starts at the point and every other point ends one: then translation gives its rows."""
-        tails = {s.tail for s in self._segments}
-        return point.bold and tails == {point} and point in self.unknowns
+        """Whether every segment leads from the point to another unknown: then translation gives its rows."""
+        tails, heads = ({getattr(s, end) for s in self._segments} for end in ("tail", "head"))
+        return point.bold and point in self.unknowns and tails == {point} and heads <= set(self.unknowns)
 
     def _others(self, hub: Name) -> list[Name]:
         return [name for name in self.unknowns if name.bold and name != hub]

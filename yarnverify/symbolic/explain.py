@@ -65,6 +65,12 @@ def explain_energy(energy: Energy, declarations: Declarations) -> dict[str, Any]
     }
 
 
+_UNPROVED = (
+    "none of plain differentiation through roots and functions; "
+    "yarnverify accuracy holds the kernels to derivatives found by another method"
+)
+
+
 def _step(title: str, note: str, formulas: list[tuple[str, str]]) -> Step:
     return {"title": title, "note": note, "formulas": [{"latex": tex, "text": text} for tex, text in formulas]}
 
@@ -161,7 +167,8 @@ def _plain_steps(energy: Energy) -> list[Step]:
     count = sum(3 if name.bold else 1 for name in energy.unknowns)
     note = (
         "This energy is not a law of known measures, which are lengths of segments and angles between them: it is "
-        f"differentiated by each of its {count} coordinates, through every sum and function that it is made of."
+        f"differentiated by each of its {count} coordinates, through every sum and function that it is made of, and through "
+        "angles between other vectors by rules that hold where these are zero."
     )
     return [_step("Plain differentiation", note, [])]
 
@@ -192,11 +199,7 @@ def explain(record: dict[str, Any], form: str) -> str:
     verdict = (
         f"Proved exactly: {blocks if record['measures'] else plain_blocks}."
         if record["all_proved"]
-        else "Proof: "
-        + (
-            ", ".join(f"{b} {v}" for b, v in record["proof"].items() if v != "proved")
-            or "not run for plain differentiation"
-        )
+        else "Proof: " + (", ".join(f"{b} {v}" for b, v in record["proof"].items() if v != "proved") or _UNPROVED)
     )
     title = f"Derivation of {record['energy']}"
     if form == "text":

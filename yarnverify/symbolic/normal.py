@@ -55,6 +55,9 @@ class Field(Reading):
         Gives states at which is looked how angles hang together.
     here
         The state that settles signs which nothing else does.
+    turns
+        Whether the angle of a point (x, y) is a generator of its own. Else it is read as an arc cosine, which hangs together
+        with other angles, but takes the root of ``x^2 + y^2``.
     """
 
     def __init__(
@@ -64,6 +67,7 @@ class Field(Reading):
         positive: Iterable[Name] = (),
         samples: Callable[[], Iterable[State]] = tuple,
         here: State | None = None,
+        turns: bool = False,
     ) -> None:
         super().__init__(section)
         own = section.unknowns  # the place that all others are seen from is one of these, not a misprint's k_b in bold
@@ -91,7 +95,7 @@ class Field(Reading):
             self.relations.relate(f"{name.label}.z", 1 - x**2 - y**2)
         self._slopes = Slopes(self.relations, self._points, self._direction, self._rules)
         self._here = None if here is None else self.place(here)
-        self._states = samples
+        self._states, self._turns = samples, turns
         self._places: dict[int, Place] = {}
         self._notes: list[Callable[[Place], bool]] = []
         self.roots, self.circles, self.exponentials = Roots(self, labels), Circles(self), Exponentials(self)
@@ -111,6 +115,12 @@ class Field(Reading):
 
     def exp(self, value: Quotient) -> Quotient:
         return self.exponentials.exp(value)
+
+    def safe(self, name: str, args: tuple[Expr, ...]) -> Quotient | None:
+        if name != "atan2" or not self._turns:
+            return None
+        y, x = (self.value(arg) for arg in args)
+        return self.circles.turn(y, x)
 
     def circle(self, angle: Quotient) -> tuple[Quotient, Quotient]:
         return self.circles.point(angle)

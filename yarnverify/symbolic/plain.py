@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from yarnverify.symbolic.latex import ACCENTS
 from yarnverify.symbolic.tree import Expr, Name
 
 _GREEK = {
@@ -9,12 +10,13 @@ _GREEK = {
     "lambda": "λ", "mu": "μ", "nu": "ν", "xi": "ξ", "rho": "ρ", "sigma": "σ", "tau": "τ", "phi": "φ", "varphi": "φ", "chi": "χ",
     "psi": "ψ", "omega": "ω", "Gamma": "Γ", "Theta": "Θ", "Phi": "Φ", "Psi": "Ψ", "Omega": "Ω", "Delta": "Δ",
 }  # fmt: skip
+_LOOSE = {"add", "neg", "mul", "frac", "cross", "dot"}  # what parentheses keep together in a product
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def name_plain(name: Name) -> str:
     """A symbol: ``theta``, ``x1``, ``k_b``."""
-    base = "".join(_GREEK.get(part, part) for part in name.base.split(" "))
+    base = "".join(_GREEK.get(part, f"{part}_" if part in ACCENTS else part) for part in name.base.split(" "))
     return base + (name.sub if name.sub.isdigit() else f"_{name.sub}" if name.sub else "")
 
 
@@ -50,17 +52,17 @@ def plain(expr: Expr) -> str:
         case "neg":
             return "-" + _wrap(args[0], {"add", "neg"})
         case "mul":
-            return " ".join(_wrap(arg, {"add", "neg", "mul", "frac"}) for arg in args)
+            return " ".join(_wrap(arg, _LOOSE) for arg in args)
         case "frac":
-            return f"{_wrap(args[0], {'add', 'neg'})} / {_wrap(args[1], {'add', 'neg', 'mul', 'frac'})}"
+            return f"{_wrap(args[0], {'add', 'neg'})} / {_wrap(args[1], _LOOSE)}"
         case "pow":
-            inner = _wrap(args[0], {"add", "neg", "mul", "frac", "pow", "derivative"})
+            inner = _wrap(args[0], {*_LOOSE, "pow", "derivative"})
             exponent = str(expr.value).translate(_SUPERSCRIPT)
             if args[0].op == "call" and len(args[0].args) == 1:
                 return f"{args[0].value}{exponent} {_wrap(args[0].args[0], {'add', 'neg', 'mul', 'frac'})}"
             return inner + exponent
         case "transpose":
-            return _wrap(args[0], {"add", "neg", "mul", "frac"}) + "ᵀ"
+            return _wrap(args[0], _LOOSE) + "ᵀ"
         case "norm" | "abs":
             return f"|{plain(args[0])}|"
         case "sqrt":
@@ -71,7 +73,7 @@ def plain(expr: Expr) -> str:
             return f"{expr.value} {_wrap(args[0], {'add', 'neg', 'mul', 'frac', 'dot', 'transpose'})}"
         case "cross" | "dot":
             sign = "×" if expr.op == "cross" else "·"
-            return f"{_wrap(args[0], {'add', 'neg', 'mul', 'frac'})} {sign} {_wrap(args[1], {'add', 'neg', 'mul', 'frac'})}"
+            return f"{_wrap(args[0], _LOOSE)} {sign} {_wrap(args[1], _LOOSE)}"
         case "derivative":
             return f"∂{plain(args[0])}/∂{name_plain(expr.name)}"
     raise AssertionError(f"no such operation: {expr.op}")

@@ -11,6 +11,7 @@ from yarnverify.symbolic.angles import sine_of, theta_itself, theta_over_sine, t
 from yarnverify.symbolic.corner import ATOMS, Corner, corner_of, corner_section
 from yarnverify.symbolic.derive import Derivation
 from yarnverify.symbolic.measures import NoMeasuresError, differentiate, scalar_symbol
+from yarnverify.symbolic.radicals import radicands, with_roots
 from yarnverify.symbolic.safe import Safe, Shape
 from yarnverify.symbolic.scalars import scalar_tree
 from yarnverify.symbolic.tree import Name
@@ -43,7 +44,7 @@ def _shape(derivation: Derivation, corner: Corner | None, shape: Shape) -> Safe:
     given = {name for m in derivation.measures if m.b is None for name in (m.a.l.name, m.a.d.name)}
     if corner is None:
         variables: dict[Any, Any] = {m: scalar_symbol(m.symbol) for m in derivation.measures}
-        law = without_cancellation(derivation.law) if vanishes(derivation.law) else sp.factor(derivation.law)
+        law = _factored(derivation.law, derivation)
         safe = Safe(derivation, shape, None, False, section, scalar_tree(law), frozenset(given))
         _differentials(safe, derivation.law, variables, lambda value: value)
         return safe
@@ -121,6 +122,8 @@ def _factored(value: Any, derivation: Derivation) -> Any:
     """In factors, in which the difference of two sliding coordinates stays one: opened, its square would cancel digits."""
     if vanishes(derivation.law):  # sums beside exponentials and logarithms have no factors: they would be opened
         return without_cancellation(value)
+    if radicands(derivation.law):
+        return with_roots(value)
     found = sp.factor(value)
     slides = [scalar_symbol(name) for name in derivation.unknowns if not name.bold]
     products = any(not term.as_coeff_Mul()[1].is_Symbol for each in found.atoms(sp.Add) for term in each.args)

@@ -1,0 +1,188 @@
+"""What people of cloth, rods and materials declare first: roots, places and speeds that are given, a hinge as it is printed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+
+from yarnverify.accuracy.cells import kernel
+from yarnverify.errors import InputError
+from yarnverify.generation import generate_kernels
+from yarnverify.library import Shelf
+from yarnverify.project import project
+from yarnverify.source import Source
+from yarnverify.symbolic.court import Verdict
+from yarnverify.symbolic.declare import (
+    Energy,
+    Expr,
+    Point,
+    Positive,
+    Real,
+    Velocity,
+    atan2,
+    cross,
+    dot,
+    energy,
+    length,
+    load_declarations,
+)
+from yarnverify.symbolic.derive import derive_declared
+from yarnverify.symbolic.invariants import prove_invariants
+from yarnverify.symbolic.plain import plain
+from yarnverify.symbolic.record import prove_source
+
+HEAD = "from yarnverify.symbolic.declare import *\n"
+ENERGIES = """
+
+@energy
+def hertz(x0: Point, x1: Point, *, E: Positive["Pa"], R: Positive["m"]):
+    delta = 2 * R - length(x1 - x0)
+    return 8 * E * sqrt(R / 2) * sqrt(delta) ** 5 / 15
+
+
+@energy
+def yielding(x0: Point, x1: Point, *, Y: Positive["N"], L: Positive["m"], e_0: Positive["1"]):
+    e = (length(x1 - x0) - L) / L
+    return Y * L * e_0 * (sqrt(1 + (e / e_0) ** 2) - 1)
+
+
+@energy
+def smoothed(x0: Point, x1: Point, *, k: Positive["N"], h: Positive["m"]):
+    return k * (sqrt(length(x1 - x0) ** 2 + h**2) - h)
+
+
+@energy(unit="W")
+def drag(v0: Velocity, *, w: Vector["m s^-1"], c: Positive["kg m^-1"]):
+    return c * length(v0 - w) ** 3 / 3
+
+
+@energy
+def tethers(x0: Point, x1: Point, *, a: Vector["m"], k: Positive["N m^-1"], L: Positive["m"]):
+    return k * ((length(x0 - a) - L) ** 2 + (length(x1 - x0) - L) ** 2) / 2
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("first") / "firsts"
+    place.mkdir()
+    (place / "energies.py").write_text(HEAD + ENERGIES, encoding="utf-8")
+    generate_kernels(False, of=project(place))
+    return place
+
+
+def l(q: Any, p: Any = (0, 0, 0)) -> Any:  # noqa: E743
+    return mpmath.sqrt(sum((a - b) ** 2 for a, b in zip(q, p, strict=True)))
+
+
+def yielding(q: Any, Y: Any, L: Any, e_0: Any) -> Any:
+    t = ((l(q[3:], q[:3]) - L) / L / e_0) ** 2
+    return Y * L * e_0 * t / (mpmath.sqrt(1 + t) + 1)
+
+
+LAWS: dict[str, Any] = {
+    "hertz": lambda q, E, R: 8 * E * mpmath.sqrt(R / 2) * mpmath.sqrt(2 * R - l(q[3:], q[:3])) ** 5 / 15,
+    "yielding": yielding,
+    "smoothed": lambda q, k, h: k * (mpmath.sqrt(l(q[3:], q[:3]) ** 2 + h**2) - h),
+    "drag": lambda q, w, c: c * l(q, w) ** 3 / 3,
+    "tethers": lambda q, a, k, L: k * ((l(q[:3], a) - L) ** 2 + (l(q[3:], q[:3]) - L) ** 2) / 2,
+}
+TWO = [0.25, -0.5, 1.0]
+STATES: list[tuple[str, list[float], dict[str, Any]]] = [
+    ("hertz", [0, 0, 0, 0.25, 0.5, 0.25], {"E": 3.0, "R": 0.75}),
+    ("hertz", [0, 0, 0, 1, 0, 0], {"E": 3.0, "R": 0.5 + 2**-30}),
+    *(("yielding", [0, 0, 0, 1 + e, 0, 0], {"Y": 2.0, "L": 1.0, "e_0": 0.001}) for e in (0, 1e-12, 1e-6, -1e-3, 0.5)),
+    *(("smoothed", [*TWO, 0.25 + d, -0.5, 1.0 - d], {"k": 2.0, "h": 1.0}) for d in (2.0**-30, 2.0**-10, 1.0)),
+    ("drag", [1.0, 2.0, 3.5], {"w": TWO, "c": 0.5}),
+    ("tethers", [1.0, 2.0, 3.5, 0.5, 2.25, 3.0], {"a": TWO, "k": 3.0, "L": 0.75}),
+]
+
+
+@pytest.mark.parametrize(("name", "q", "values"), STATES)
+def test_values_slopes_and_bends_are_those_of_long_differences(
+    folder: Path, name: str, q: list[float], values: dict[str, Any]
+) -> None:
+    """Differences in 100 digits, with a step of 1e-30: an oracle without a line of this package."""
+    columns = {key: np.reshape(value, (3, 1)) if isinstance(value, list) else value for key, value in values.items()}
+    found = kernel("accurate", name, folder).evaluate(np.array(q)[:, None], **columns)
+    with mpmath.workdps(100):
+        step, n = mpmath.mpf(10) ** -30, len(q)
+
+        def at(*moves: tuple[int, int]) -> Any:
+            moved = [mpmath.mpf(part) for part in q]
+            for row, sign in moves:
+                moved[row] += sign * step
+            return LAWS[name](
+                moved, **{k: [*map(mpmath.mpf, v)] if isinstance(v, list) else mpmath.mpf(v) for k, v in values.items()}
+            )
+
+        slopes = [(at((i, 1)) - at((i, -1))) / (2 * step) for i in range(n)]
+        bends = [
+            [sum(a * b * at((i, a), (j, b)) for a in (1, -1) for b in (1, -1)) / (4 * step**2) for j in range(n)]
+            for i in range(n)
+        ]
+        for mine, true in zip(found, ([at()], slopes, [part for row in bends for part in row]), strict=True):
+            error = mpmath.norm([mpmath.mpf(float(a)) - b for a, b in zip(np.ravel(mine), true, strict=True)])
+            assert error <= 16 * 2.0**-53 * mpmath.norm(true) + mpmath.mpf(10) ** -35
+
+
+def test_whatever_is_measured_from_a_given_place_or_speed_is_proved(folder: Path) -> None:
+    """No translation gives the rows of a point then: what is given does not move with it."""
+    for declared in load_declarations(folder).energies:
+        derivation = derive_declared(declared, ())
+        assert derivation is not None
+        assert {finding.verdict for finding in derivation.check().values()} == {Verdict.PROVED}
+
+
+@energy(unit="W", unchanged=("translation",))
+def friction(v0: Velocity, v1: Velocity, *, c: Positive["N s m^-1"]) -> Expr:
+    return c * length(v1 - v0) ** 2 / 2
+
+
+@energy(unchanged=("sliding",))
+def bar(x0: Point, x1: Point, *, k: Positive["N m^-1"]) -> Expr:
+    return k * length(x1 - x0) ** 2 / 2
+
+
+@pytest.mark.parametrize(("declared", "lacking"), [(friction, 'Point or Vector\\["m"\\]'), (bar, "Sliding")])
+def test_a_motion_that_moves_nothing_is_told(declared: Energy, lacking: str) -> None:
+    with pytest.raises(
+        InputError, match=rf"{declared.name}: unchanged by \w+ says nothing here: there is no {lacking}"
+    ):
+        prove_invariants(declared)
+
+
+@energy
+def hinge(x0: Point, x1: Point, x2: Point, x3: Point, *, k: Positive["J"], bar_theta: Real["rad"]) -> Expr:
+    e = x1 - x0
+    n1, n2 = cross(e, x2 - x0), cross(x3 - x0, e)
+    return k * (atan2(dot(cross(n1, n2), e) / length(e), dot(n1, n2)) - bar_theta) ** 2
+
+
+def test_products_keep_their_parentheses_in_plain_text() -> None:
+    text = plain(hinge.expression)
+    assert "(((x1 - x0) × (x2 - x0)) × ((x3 - x0) × (x1 - x0)))ᵀ (x1 - x0)" in text and "bar_θ" in text
+
+
+HINGE = r"""## Hinge
+$$\mathbf{e} = \mathbf{x}_1 - \mathbf{x}_0, \quad \mathbf{n}_1 = \mathbf{e} \times (\mathbf{x}_2 - \mathbf{x}_0),
+  \quad \mathbf{n}_2 = (\mathbf{x}_3 - \mathbf{x}_0) \times \mathbf{e} \quad (1)$$
+$$\theta = \operatorname{atan2}\left(
+  \frac{(\mathbf{n}_1 \times \mathbf{n}_2)^T \mathbf{e}}{\|\mathbf{e}\|}, \mathbf{n}_1^T \mathbf{n}_2\right) \quad (2)$$
+$$V = \frac{1}{2} k (\theta - \theta_0)^2 \quad (3)$$
+$$\mathbf{F}_{\mathbf{x}_2} = k (\theta - \theta_0) \frac{\|\mathbf{e}\|}{\mathbf{n}_1^T \mathbf{n}_1} \mathbf{n}_1 \quad (4)$$
+$$\mathbf{F}_{\mathbf{x}_3} = k (\theta - \theta_0) \frac{\|\mathbf{e}\|}{\mathbf{n}_2^T \mathbf{n}_2} \mathbf{n}_1 \quad (5)$$
+$$\mathbf{F}_{\mathbf{x}_0} = -\mathbf{F}_{\mathbf{x}_1} - \mathbf{F}_{\mathbf{x}_2} - \mathbf{F}_{\mathbf{x}_3} \quad (6)$$
+"""
+
+
+def test_the_forces_of_a_hinge_are_proved_and_their_misprint_is_mended() -> None:
+    """By the slope of an angle of two arguments, which is free of roots; an arc cosine has one that hides what is equal."""
+    record = prove_source(Source("hinge.md", HINGE), Shelf(None, "hinge.md", "by itself alone"))
+    found = {claim["equation"]: claim for claim in record["claims"]}
+    assert [found[n]["verdict"] for n in "456"] == ["proved", "refuted", "proved"]
+    assert found["5"]["change"] == r"index: \mathbf{n}_1 should be \mathbf{n}_2"
