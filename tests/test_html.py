@@ -12,6 +12,7 @@ from xml.etree.ElementTree import fromstring
 import pytest
 
 from tests.pages import records, simulated, whole_page
+from yarnverify.report.brief import brief
 from yarnverify.report.mathml import compared, formula
 from yarnverify.report.scenes import scenes
 from yarnverify.report.svg import inline
@@ -92,6 +93,61 @@ def test_the_table_of_verdicts_adds_up(text: str) -> None:
     assert len(parts) == 5  # shared definitions, and four energies
     assert [sum(column) for column in zip(*parts, strict=True)] == together
     assert together == [records()["verdicts"]["tally"][verdict] for verdict in ("proved", "refuted")]
+
+
+def header(text: str) -> str:
+    return " ".join("".join(read(text.split("<header>")[1].split("</header>")[0]).text).split())
+
+
+def test_the_first_words_are_the_verdict(text: str) -> None:
+    assert "3 of 44 numbered equations are wrong: (8), (18), (21)." in header(text)
+    assert "What is refuted is known" in header(text)
+    found = copy.deepcopy(records())
+    for claim in found["verdicts"]["claims"]:
+        claim["verdict"] = "undecided" if claim["equation"] == "18" else "proved"
+    found["verdicts"]["as_expected"] = False
+    found["verdicts"]["completeness"][1]["missing"] = [{"block": "dF_x1/du1", "latex": "a", "derived": "b"}]
+    assert "No equation is refuted; 1 of 44 is not proved. 1 force or Jacobian is missing." in header(whole_page(found))
+    assert "Not as expected" in header(whole_page(found))
+
+
+def test_the_summary_says_what_the_records_say() -> None:
+    found = copy.deepcopy(records())
+    assert [part for part, _ in brief(found)] == ["accuracy", "speed", "scenes", "analysis"]
+    cell = next(
+        cell for cell in found["accuracy"]["cells"] if (cell["variant"], cell["dtype"]) == ("accurate", "float64")
+    )
+    assert float(dict(brief(found))["accuracy"].split("error is ")[1].split()[0]) <= 16
+    cell["outputs"]["G"]["worst"] = 1234.0
+    assert "worst error is 1e3 units of 2^-53, over 48 kinds of hard states of 7" in dict(brief(found))["accuracy"]
+    cell["outputs"]["H"]["worst"] = "inf"
+    assert "worst error is not finite" in dict(brief(found))["accuracy"]
+    found["simulation"]["scenes"][0]["result"]["missed"] = ["one", "two"]
+    assert dict(brief(found))["scenes"].endswith("2 goals missed.")
+    found["analysis"]["moduli"]["rows"][0]["agree within 1e-9"] = False
+    assert dict(brief(found))["analysis"].startswith("6 of 7 moduli")
+    assert brief(found | {"accuracy": None, "benchmark": None, "simulation": None, "analysis": None}) == []
+
+
+def test_speed_in_the_summary_is_that_of_the_default_kernels() -> None:
+    found = copy.deepcopy(records())
+    energies = found["benchmark"]["energies"]
+    for name in list(energies)[1:]:
+        del energies[name]
+    (own,) = energies.values()
+    entry = next(entry for entry in own["states"]["mixed"] if entry["n"] == 100_000)
+    entry["ns"]["accurate"] = [77.0, 1.0, 99.0]
+    entry["times as fast as"] = {"jax": {"accurate": [3.5, 1.0, 9.0]}}
+    assert dict(brief(found))["speed"] == (
+        "Energy, gradient and Hessian of an element take 77 ns: 3.5 times as fast as jax."
+    )
+
+
+def test_regimes_and_variants_are_explained(text: str) -> None:
+    own = text.split('<section aria-labelledby="accuracy">')[1].split("</section>")[0]
+    terms = re.findall("<dt>([^<]+)</dt>", own)
+    cells = records()["accuracy"]["cells"]
+    assert {cell["regime"] for cell in cells} | {cell["variant"] for cell in cells} == set(terms)
 
 
 def test_a_correction_and_its_equation_lead_to_each_other(text: str) -> None:

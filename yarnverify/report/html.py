@@ -11,9 +11,10 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from yarnverify.report.accuracy import error_table, kinds, worst_state
+from yarnverify.report.accuracy import VARIANTS, error_table, kinds, worst_state
 from yarnverify.report.analysis import analysis_tables, fabric_line
 from yarnverify.report.benchmark import tables, where
+from yarnverify.report.brief import brief
 from yarnverify.report.mathml import compared, formula
 from yarnverify.report.pages import mistakes
 from yarnverify.report.proof import proof_of
@@ -79,6 +80,11 @@ def page(
         style=Markup((_FOLDER / "templates" / "page" / "report.css").read_text(encoding="utf-8")),
         font=b64encode((_FOLDER / "fonts" / "stix-two-math.woff2").read_bytes()).decode(),
         found=found,
+        brief=brief(records),
+        missing=sum(len(part["missing"]) for part in found["completeness"]),
+        variants=VARIANTS,
+        hard_cases={case: text for own in derived.values() for case, text in own["hard_cases"].items()},
+        refuted=list(dict.fromkeys(claim["equation"] for claim in found["claims"] if claim["verdict"] == "refuted")),
         columns=[each for each in found["tally"] if each in ("proved", "refuted") or found["tally"][each]],
         derived=derived,
         proofs={name: proof_of(derivation) for name, derivation in derived.items()},

@@ -59,4 +59,4 @@ def _listed(part: Mapping[str, Any] | None, section: str) -> str:
         return "not in the document" if section else "–"
     if part["missing"]:
         return f"lacks {', '.join(item['block'] for item in part['missing'])}"
-    return f"complete: {len(part['listed'])}"
+    return f"all {len(part['listed'])}"
