@@ -40,6 +40,6 @@ def drawn(folder: Path) -> dict[str, Any]:
     return {"turned": {"elastica": path.read_text(encoding="utf-8")}}
 
 
-def whole_page(found: dict[str, Any] | None = None, **more: Any) -> str:
+def whole_page(found: dict[str, Any] | None = None, name: str = "", **more: Any) -> str:
     pictures = {path.stem: path.read_text(encoding="utf-8") for path in (REPORTS / "pictures").glob("*.svg")}
-    return page(records() | {"simulation": simulated()} if found is None else found, pictures, **more)
+    return page(records() | {"simulation": simulated()} if found is None else found, pictures, name, **more)

@@ -83,17 +83,39 @@ def test_it_fits_the_screen(opened: tuple[str, Any, list[str]]) -> None:
     assert outside == 0
 
 
-def test_a_formula_that_is_too_long_scrolls_by_itself(opened: tuple[str, Any, list[str]]) -> None:
+@pytest.mark.parametrize("place", [".derivation .formula", ".equations .formula", ".mistake .formula", ".mistake .was"])
+def test_a_formula_that_is_too_long_scrolls_by_itself(opened: tuple[str, Any, list[str]], place: str) -> None:
     page = opened[1]
     found = page.evaluate(
-        """() => { const seen = [...document.querySelectorAll('.derivation .formula')].find(
-               each => each.getClientRects().length);
+        """place => { const seen = [...document.querySelectorAll(place)].find(
+               each => each.getClientRects().length && each instanceof HTMLElement);
              const long = seen.appendChild(document.createElement('span'));
              long.style.cssText = 'display: inline-block; width: 3000px';
              const right = long.getBoundingClientRect().right, whole = document.documentElement.scrollWidth;
-             long.remove(); return [right > innerWidth, whole <= innerWidth] }"""
+             long.remove(); return [right > innerWidth, whole <= innerWidth] }""",
+        place,
     )
     assert found == [True, True]
+
+
+def test_what_a_table_shows_can_be_read_without_scrolling_it(opened: tuple[str, Any, list[str]]) -> None:
+    cut = opened[1].evaluate(
+        """() => [...document.querySelectorAll('caption span')].filter(each =>
+             each.getBoundingClientRect().right > innerWidth).map(each => each.textContent)"""
+    )
+    assert cut == []
+
+
+def test_two_clicks_from_anywhere_to_an_equation(opened: tuple[str, Any, list[str]]) -> None:
+    page = opened[1]
+    page.evaluate("document.documentElement.style.scrollBehavior = 'auto'; scrollTo(0, document.body.scrollHeight / 2)")
+    page.locator(".contents a", has_text="Verdicts").click()
+    page.locator(".glance a[href='#equation-18']").click()
+    covered, top = page.evaluate(
+        """() => [document.querySelector('.contents').getBoundingClientRect().bottom,
+                  document.getElementById('equation-18').getBoundingClientRect().top]"""
+    )
+    assert 0 < covered <= top < page.viewport_size["height"] / 2
 
 
 def test_accessible(opened: tuple[str, Any, list[str]]) -> None:

@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -105,7 +106,7 @@ def test_single_precision_is_held_to_its_own_unit() -> None:
         ("bending_transposed", "wrong: H[x1,x2]: is transposed"),
         ("stretch_without_projection", "wrong: H[x1,x1]: is off by a multiple of P_1: that term is wrong, or missing"),
         ("bending_sign_of_a_term", "wrong: H[x1,x1]: is off by a multiple of d_1 d_2^T P_1: that term is wrong"),
-        ("bending_chord", "wrong: E[]: is 4 sin(angle/2)^2/angle^2 times what it should be"),
+        ("bending_chord", "wrong: E[]: takes 2 sin(angle/2) for the angle, and so 2 (1 - cos(angle)) for its square"),
         ("bending_chord", "wrong: G[x1]: lacks a factor (|x1 - x0| + |x0 - x2|)/(u1 - u2)"),
         ("bending_chord", "wrong: G[x2]: lacks a factor angle/sin(angle)"),
         ("bending_swapped", "wrong: G[x1]: is the block x2: indices are swapped"),
@@ -118,13 +119,18 @@ def test_single_precision_is_held_to_its_own_unit() -> None:
             "bending_printed_with_a_step",
             "H[x1,x1]: is what the document prints, misprint included: equation (18), times 1e-06",
         ),
+        (
+            "bending_printed_with_two_stiffnesses",
+            "H[x1,x1]: is what the document prints, misprint included: equation (18), times 2 k_b",
+        ),
         ("bending_supplement", "takes pi minus the angle for the angle: its cosine has the wrong sign"),
         ("bending_sum_left_out", "wrong: G[x0]: lacks minus x2: it is left out of a sum"),
         (
             "bending_of_curvature",
-            "is 4 (u1 - u2) (tan(angle/2)/angle)^2/(|x1 - x0| + |x0 - x2|) times what it should be",
+            "takes 2 tan(angle/2), as discrete elastic rods have it, for the angle, and takes the present length for the rest "
+            "length that it is spread on",
         ),
-        ("shear_of_the_cosine", "lacks a factor |angle - pi/2|^2/cos(angle)^2"),
+        ("shear_of_the_cosine", "wrong: E[]: takes cos(angle) for pi/2 - angle"),
         ("parallel_contact_nearer", "is right for 1/2 d in place of d"),
         ("gravity_upwards", "wrong: G[u0] G[u1]: has the wrong sign"),
         ("shear_in_degrees", "is (180/pi)^2 times what it should be: an angle in degrees"),
@@ -197,6 +203,16 @@ def test_only_the_mistaken_blocks_fail() -> None:
         ("bending_mixed_signs", {}, "x0 x1 x2 have the sign of the gradient, u1 u2 have that of the force"),
         ("stretch_of_nodes", {"energy": "stretch"}, "matches with --order x0,u0,x1,u1 --force --jacobian"),
         ("bending_without_stiffness", {}, "matches with --fix k_b=1"),
+        (
+            "stretch_with_a_step",
+            {},
+            "the whole Hessian is 0.0001 times what it should be; if that is a squared time step",
+        ),
+        (
+            "stretch_of_weft",
+            {"order": "x0,x1,v0,u0,v1,u1"},
+            "the Hessian u0, u1 came in the place of v0 by v1",
+        ),
     ],
 )
 def test_another_convention_is_found(name: str, options: dict[str, Any], hint: str) -> None:
@@ -392,6 +408,7 @@ void too_far(in q, in p, out e, out g, out h) { contact(q, p, e, g, h); g[2] = 1
 void too_little(in q, in p, out e, out g, out h) { double t[4]; contact(q, p, e, g, t); h[0] = t[0]; h[1] = t[1]; h[2] = t[2]; }
 void meddles(double *q, in p, out e, out g, out h) { contact(q, p, e, g, h); q[0] = 0; }
 void aborts(in q, in p, out e, out g, out h) { if (p[0] > 1.5) abort(); contact(q, p, e, g, h); }
+void radius_first(in q, in p, out e, out g, out h) { double t[3] = {p[1], p[2], 4 * p[0]}; contact(q, t, e, g, h); }
 void force_only(in q, in p, out f) { double e, g[2], h[4]; contact(q, p, &e, g, h); f[0] = -g[0]; f[1] = -g[1]; }
 void single(const float *q, const float *p, float *e, float *g, float *h) {
     float gap = q[1] - q[0] - p[2], k = gap < 0 ? p[0] * p[1] : 0;
@@ -426,6 +443,13 @@ def test_c_functions(library: str, function: str, options: dict[str, Any], passe
     found = check(f"{library}:{function}", Options(energy="parallel_contact", count=6, **options))
     assert found.passes is passes, said(found)
     assert text in " ".join(what for what, *_ in found.troubles)
+
+
+def test_another_order_of_the_arguments_is_found(library: str) -> None:
+    options = Options(energy="parallel_contact", count=6, given=("kc=k_c", "L=L", "R=d/4"))
+    (hint,) = check(f"{library}:radius_first", options).hints
+    assert hint == "matches with the arguments in another order: --with R=d/4 --with kc=k_c --with L=L"
+    assert check(f"{library}:radius_first", replace(options, given=("R=d/4", "kc=k_c", "L=L"))).passes
 
 
 def test_a_library_without_that_function(library: str) -> None:

@@ -12,6 +12,7 @@ from xml.etree.ElementTree import fromstring
 import pytest
 
 from tests.pages import records, simulated, whole_page
+from yarnverify.report.brief import brief
 from yarnverify.report.mathml import compared, formula
 from yarnverify.report.scenes import scenes
 from yarnverify.report.svg import inline
@@ -85,6 +86,90 @@ def test_every_verdict_of_the_record_is_shown(text: str) -> None:
         assert verdict == ("refuted" if "refuted" in verdicts else "proved")
 
 
+def test_the_table_of_verdicts_adds_up(text: str) -> None:
+    table = text.split('aria-label="Verdicts by section"')[1].split("</table>")[0]
+    rows = [re.findall(r'<td class="number">(\d+)', row) for row in table.split("<tr>")[2:]]
+    *parts, together = [[int(count) for count in row] for row in rows]
+    assert len(parts) == 5  # shared definitions, and four energies
+    assert [sum(column) for column in zip(*parts, strict=True)] == together
+    assert together == [records()["verdicts"]["tally"][verdict] for verdict in ("proved", "refuted")]
+
+
+def header(text: str) -> str:
+    return " ".join("".join(read(text.split("<header>")[1].split("</header>")[0]).text).split())
+
+
+def test_the_first_words_are_the_verdict(text: str) -> None:
+    assert "3 of 44 numbered equations are wrong: (8), (18), (21)." in header(text)
+    assert "What is refuted is known" in header(text)
+    found = copy.deepcopy(records())
+    for claim in found["verdicts"]["claims"]:
+        claim["verdict"] = "undecided" if claim["equation"] == "18" else "proved"
+    found["verdicts"]["as_expected"] = False
+    found["verdicts"]["completeness"][1]["missing"] = [{"block": "dF_x1/du1", "latex": "a", "derived": "b"}]
+    assert "No equation is refuted; 1 of 44 is not proved. 1 force or Jacobian is missing." in header(whole_page(found))
+    assert "Not as expected" in header(whole_page(found))
+
+
+def test_the_summary_says_what_the_records_say() -> None:
+    found = copy.deepcopy(records())
+    assert [part for part, _ in brief(found)] == ["accuracy", "speed", "scenes", "analysis"]
+    cell = next(
+        cell for cell in found["accuracy"]["cells"] if (cell["variant"], cell["dtype"]) == ("accurate", "float64")
+    )
+    assert float(dict(brief(found))["accuracy"].split("error is ")[1].split()[0]) <= 16
+    cell["outputs"]["G"]["worst"] = 1234.0
+    assert "worst error is 1e3 units of 2^-53, over 48 kinds of hard states of 7" in dict(brief(found))["accuracy"]
+    cell["outputs"]["H"]["worst"] = "inf"
+    assert "worst error is not finite" in dict(brief(found))["accuracy"]
+    found["simulation"]["scenes"][0]["result"]["missed"] = ["one", "two"]
+    assert dict(brief(found))["scenes"].endswith("2 goals missed.")
+    found["analysis"]["moduli"]["rows"][0]["agree within 1e-9"] = False
+    assert dict(brief(found))["analysis"].startswith("6 of 7 moduli")
+    assert brief(found | {"accuracy": None, "benchmark": None, "simulation": None, "analysis": None}) == []
+
+
+def test_speed_in_the_summary_is_that_of_the_default_kernels() -> None:
+    found = copy.deepcopy(records())
+    energies = found["benchmark"]["energies"]
+    for name in list(energies)[1:]:
+        del energies[name]
+    (own,) = energies.values()
+    entry = next(entry for entry in own["states"]["mixed"] if entry["n"] == 100_000)
+    entry["ns"]["accurate"] = [77.0, 1.0, 99.0]
+    entry["times as fast as"] = {"jax": {"accurate": [3.5, 1.0, 9.0]}}
+    assert dict(brief(found))["speed"] == (
+        "Energy, gradient and Hessian of an element take 77 ns: 3.5 times as fast as jax."
+    )
+
+
+def test_regimes_and_variants_are_explained(text: str) -> None:
+    own = text.split('<section aria-labelledby="accuracy">')[1].split("</section>")[0]
+    terms = re.findall("<dt>([^<]+)</dt>", own)
+    cells = records()["accuracy"]["cells"]
+    assert {cell["regime"] for cell in cells} | {cell["variant"] for cell in cells} == set(terms)
+
+
+def test_a_correction_and_its_equation_lead_to_each_other(text: str) -> None:
+    row = text.split('<tr id="equation-18"')[1].split("</tr>")[0]
+    assert 'href="#correction-18"' in row
+    assert 'href="#equation-18"' in text.split('id="correction-18"')[1].split("</h3>")[0]
+    assert 'href="#correction' not in text.split('<tr id="equation-17"')[1].split("</tr>")[0]
+
+
+def test_powers_are_raised_whole(text: str) -> None:
+    assert re.search(r"n<sup>\d\.\d\d</sup>", text)
+    assert not re.search(r"</sup>\.?\d", text)
+
+
+def test_commands_for_energies_of_ones_own_name_them() -> None:
+    found = records() | {"benchmark": None, "accuracy": None, "analysis": None, "simulation": None}
+    text = "".join(read(whole_page(found, name="my_model")).text)
+    commands = re.findall(r"yarnverify (?:prove|derive|generate|accuracy|benchmark|report).*", text)
+    assert "yarnverify benchmark my_model --json my_model/reports/records/benchmark.json" in commands
+    assert all("my_model" in command for command in commands)
+
+
 def test_every_step_of_every_derivation_is_shown(text: str) -> None:
     own = text.split('<section aria-labelledby="derivations">')[1].split("</section>")[0]
     parts = dict(zip(*[iter(re.split(r'<h3 id="derivation-(\w+)">', own)[1:])] * 2, strict=True))
@@ -141,7 +226,7 @@ def test_text_of_a_document_is_no_markup() -> None:
 def test_scenes_show_errors_orders_and_seconds() -> None:
     text = " ".join("".join(read(whole_page(photos={"elastica": b"PNG"})).text).split())
     assert "A hanging yarn, stretched by its own weight" in text
-    assert "Command: yarnverify simulate elastica --out reports/scenes/elastica" in text
+    assert "Command: yarnverify simulate elastica --size 10 20 --out reports/scenes/elastica" in text
     runs = scenes(simulated())[1].runs
     assert runs is not None and runs.headings[:4] == ("wall", "segments", "unknowns", "iterations")
     assert runs.headings[-1] == "seconds" and len(runs.rows) == 4
@@ -154,10 +239,27 @@ def test_results_of_a_gallery_are_shown_without_a_record() -> None:
         for run in line["runs"]:
             run["answers"] = []
     text = whole_page(records() | {"simulation": None}, gallery=[result], photos={"hanging_yarn": b"PNG"})
-    assert "Command: <code>yarnverify simulate hanging_yarn --size 8 --out reports/scenes/hanging_yarn</code>" in text
+    command = "Command: yarnverify simulate hanging_yarn --size 4 8 --out reports/scenes/hanging_yarn"
+    assert command in "".join(read(text).text)
     assert 'alt="The end of the scene: a hanging yarn' in text
     assert "Not compared with known answers: not run." in text
     assert len(scenes(simulated(), [result])) == 2  # the record has it
+
+
+def test_a_picture_of_another_run_says_which() -> None:
+    other = copy.deepcopy(simulated()["scenes"][1]["result"])
+    other["lines"][0]["runs"] = other["lines"][0]["runs"][:1]
+    other["parameters"]["alpha"]["value"] = 2.5
+    drawn = "yarnverify simulate elastica --set alpha=2.5 --size 10 --out reports/scenes/elastica"
+    assert scenes(simulated(), [other])[1].pictured == drawn
+    text = "".join(read(whole_page(gallery=[other], photos={"elastica": b"PNG"})).text)
+    assert f"Drawn by {drawn}" in text
+    same = simulated()["scenes"][1]["result"]
+    assert "Drawn by" not in whole_page(gallery=[same], photos={"elastica": b"PNG"})
+
+
+def test_the_overview_leads_to_every_scene(text: str) -> None:
+    assert {"#scene-hanging-yarn", "#scene-elastica"} <= set(read(text).targets)
 
 
 def test_a_goal_that_was_missed_is_shown() -> None:

@@ -175,3 +175,24 @@ def test_names_are_moved_apart_and_keep_their_order() -> None:
     assert spaced([9.9, 10.0, 9.8], 1.0, 0.0, 10.0) == [9.0, 10.0, 8.0]
     crowded = spaced([1.0, 1.2, 1.9, 2.4, 8.0], 1.0, 0.0, 10.0)
     assert all(b - a >= 1 - 1e-9 for a, b in pairwise(crowded))
+
+
+@pytest.mark.parametrize("scene", ["energy_over_time", "axial_swing"])  # three ways; one answer and two
+def test_the_legend_of_a_work_precision_diagram_is_not_cut(scene: str, tmp_path: Path) -> None:
+    from tests.pages import records
+    from yarnverify.report.precision import precision
+
+    (each,) = [each for each in records()["simulation"]["scenes"] if each["result"]["scene"] == scene]
+    drawn: list[Any] = []
+
+    def draw() -> Any:
+        drawn.append(precision(each["result"], each["timings"]))
+        return drawn[-1]
+
+    write(draw, tmp_path / "picture")
+    figure = drawn[0]
+    figure.draw_without_rendering()
+    (legend,) = figure.legends
+    box, whole = legend.get_window_extent(), figure.bbox
+    assert whole.x0 <= box.x0 < box.x1 <= whole.x1
+    assert box.y1 <= whole.y1

@@ -185,7 +185,7 @@ def _sweep(of: Project, out: Path, advance: Callable[[str, int], None]) -> tuple
 
 def _records(of: Project, check: bool, advance: Callable[[str, int], None]) -> tuple[dict[str, Any], list[str], bool]:
     """The records behind the pages, what to say of them, and whether all is as expected."""
-    from yarnverify.accuracy.regimes import not_drawn
+    from yarnverify.accuracy.regimes import not_drawn, regimes
     from yarnverify.symbolic.declare import load_declarations
     from yarnverify.symbolic.explain import explain_energy
 
@@ -204,7 +204,10 @@ def _records(of: Project, check: bool, advance: Callable[[str, int], None]) -> t
             [b"derivation", energy.name.encode(), *declared_files(of.folder)],
             partial(explain_energy, energy, declarations),
         )
-        derived[energy.name] = {"section": energy.section, "title": title, "not_swept": not_drawn(energy), **explained}
+        why = not_drawn(energy)
+        hard = {} if why else {regime.name: regime.meaning for regime in regimes(energy)}
+        about = {"section": energy.section, "title": title, "not_swept": why, "hard_cases": hard}
+        derived[energy.name] = {**about, **explained}
         advance(f"explaining {energy.name}", len(energies))
     lines = (
         [*mistake_lines(found), *tally_lines(found), f"{took}."]

@@ -10,6 +10,7 @@
     sources.py      where results come from: functions, a command line, a file
     judge.py        each block: pass or fail, by one rule
     recognise.py    what is wrong: another formula (``formula.py``, ``factors.py``), or lost digits (``digits.py``)
+    laws.py         other laws that people take for an energy's own, in one table; measures.py finds their place in its formula
     hints.py        other conventions under which it would be right
     show.py         the tables; command.py puts all of it together
 

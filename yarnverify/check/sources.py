@@ -5,8 +5,8 @@ from __future__ import annotations
 import shlex
 import subprocess
 import tempfile
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,29 @@ LIBRARIES = (".so", ".dylib", ".dll")
 WHOLE = ("energy", "gradient", "hessian")
 
 
+@dataclass(frozen=True)
+class Again:
+    """An implementation that can be called once more.
+
+    Attributes
+    ----------
+    run
+        Takes (m, rows) of states, the number of the case that each is of, and (m,) of arguments that are to be others; gives
+        (m, total), or None where it does not come back.
+    by_name
+        Whether it takes its unknowns by name.
+    states
+        (n, rows) as it was called with.
+    positions
+        What it was passed after the state, in order and not by name: (n,) by what a person called it.
+    """
+
+    run: Callable[[Array, Array, Mapping[str, Array]], Array | None]
+    by_name: bool
+    states: Array
+    positions: Mapping[str, Array]
+
+
 def called(
     target: str,
     setting: Setting,
@@ -33,7 +56,7 @@ def called(
     values: dict[str, Array],
     notes: list[str],
     advance: Advance,
-) -> tuple[Ran, Convention | None, Callable[[Array, Array], Array | None] | None]:
+) -> tuple[Ran, Convention | None, Again | None]:
     place = target.rpartition(":")[0] if ":" in target[2:] else target
     library = Path(place).suffix in LIBRARIES
     if library and (place == target or not target.rpartition(":")[2]):
@@ -72,13 +95,14 @@ def called(
     if ran.decided["dtype"] == "float32" and setting.cases.dtype == "float64":
         notes.append("gives float32: hold it to single precision with --float32")
 
-    def again(states: Array, at: Array) -> Array | None:
+    def run(states: Array, at: Array, others: Mapping[str, Array]) -> Array | None:
         by_row = states.T
         repeated = {name: value[at] for name, value in values.items()}
         columns = {row.label: by_row[i] for i, row in enumerate(setting.rows)}
         for label, rows in setting.cases.labels:
             parts = [columns[f"{label}.{axis}"] for axis in "xyz"] if rows.stop - rows.start == 3 else [columns[label]]
             repeated[label] = np.column_stack(parts) if len(parts) == 3 else parts[0]
+        repeated |= others
         try:
             found = run_target(
                 {**task, "layout": convention.layout}, states, repeated, [(0, len(states))], options.time_limit
@@ -87,7 +111,8 @@ def called(
             return None
         return found.flat if found.decided is not None and found.flat.shape[1] == ran.flat.shape[1] else None
 
-    return ran, convention, again
+    positions = {name: values[name] for name in setting.parameters} if library else {}
+    return ran, convention, Again(run, bool(ran.decided.get("by_name")), q, positions)
 
 
 def _manner(layout: str) -> str:

@@ -19,7 +19,7 @@ def check(
     order: Annotated[
         str | None,
         Parameter(
-            help="Order of your unknowns: x0,x1,x2,u1,u2. A name that the energy lacks gets 0; _ is passed over."
+            help="Order of your unknowns: x0,x1,x2,u1,u2. Results for a name that the energy lacks must be 0; _ is passed over."
         ),
     ] = None,
     returns: Annotated[

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from yarnverify.report.table import Table
+from yarnverify.report.table import Table, number
 
 _OUTPUTS = ("E", "G", "H")
 _MARK = {"exact": "", "conditioning": "ᶜ", "computation": "*", "not finite": "*"}
+VARIANTS = {  # what the columns are
+    "printed": "the document's own formulas, misprints included",
+    "differentiated": "what differentiating an energy and printing code gives",
+    "fast": "the derived formulas in plain arithmetic",
+    "accurate": "the default kernels: the derived formulas in forms that lose nothing",
+    "reference": "twice the digits, rounded once; slow",
+}
 _KEY = (
     "No mark: at most 16 units. ᶜ: more, explained by the condition of the state (16 units and 8 for each unit of the "
     "condition number). *: lost by the computation. ∞: not finite where the true result is. –: no true result in range."
@@ -77,8 +84,4 @@ def _number(found: dict[str, Any]) -> str:
         return "–"
     if worst == "inf":
         return "∞*"
-    if worst < 1000:
-        text = f"{worst:.0f}" if worst >= 100 else f"{worst:.2g}"
-    else:
-        text = f"{worst:.0e}".replace("e+", "e").replace("e0", "e")
-    return text + _MARK[found["label"]]
+    return number(worst) + _MARK[found["label"]]

@@ -11,9 +11,10 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from yarnverify.report.accuracy import error_table, kinds, worst_state
+from yarnverify.report.accuracy import VARIANTS, error_table, kinds, worst_state
 from yarnverify.report.analysis import analysis_tables, fabric_line
 from yarnverify.report.benchmark import tables, where
+from yarnverify.report.brief import brief
 from yarnverify.report.mathml import compared, formula
 from yarnverify.report.pages import mistakes
 from yarnverify.report.proof import proof_of
@@ -21,21 +22,12 @@ from yarnverify.report.scenes import scenes
 from yarnverify.report.simulation import frugality, summary
 from yarnverify.report.simulation_speed import speed_tables
 from yarnverify.report.svg import inline
+from yarnverify.report.tally import anchor_of, counted
 
 _FOLDER = Path(__file__).parent
 _ORDER = ("refuted", "inconsistent", "undecided", "proved")
 _SIGN = {"proved": "✓", "refuted": "✗", "undecided": "?", "inconsistent": "!"}
-_PARTS = (  # anchor and heading, in reading order
-    ("verdicts", "Verdicts"),
-    ("corrections", "What is wrong in the document"),
-    ("equations", "Every equation"),
-    ("derivations", "Derivations"),
-    ("accuracy", "Accuracy"),
-    ("speed", "Speed"),
-    ("scenes", "Scenes"),
-    ("analysis", "Analysis"),
-    ("commands", "How to get these numbers again"),
-)
+_PARTS = ("verdicts", "corrections", "equations", "derivations", "accuracy", "speed", "scenes", "analysis", "commands")
 
 
 def page(
@@ -65,6 +57,7 @@ def page(
     found, derived = records["verdicts"], records["derivations"]
     analysis, simulation = records.get("analysis"), records.get("simulation")
     speed = records.get("simulation-speed")
+    shown = scenes(simulation, gallery)
     absent = ("scenes", "analysis") * bool(name) + ("verdicts", "corrections", "equations") * (not found["document"])
     templates = Environment(
         loader=FileSystemLoader(_FOLDER / "templates" / "page"),
@@ -78,15 +71,26 @@ def page(
     templates.filters["capitalize_first"] = lambda text: text[:1].upper() + text[1:]
     templates.globals.update(sign=_SIGN, worst_verdict=_worst, where=where)
     templates.globals.update(argument=f" {name}" if name else "", prefix=f"{name}/" if name else "")
+    templates.globals["benchmark_command"] = (
+        f"yarnverify benchmark{f' {name}' if name else ''} --json {f'{name}/' if name else ''}reports/records/benchmark.json"
+    )
     return templates.get_template("report.html.jinja").render(
-        parts=[(anchor, title) for anchor, title in _PARTS if anchor not in absent],
+        parts=[part for part in _PARTS if part not in absent],
         absent=absent,
         style=Markup((_FOLDER / "templates" / "page" / "report.css").read_text(encoding="utf-8")),
         font=b64encode((_FOLDER / "fonts" / "stix-two-math.woff2").read_bytes()).decode(),
         found=found,
+        brief=brief(records),
+        missing=sum(len(part["missing"]) for part in found["completeness"]),
+        variants=VARIANTS,
+        hard_cases={case: text for own in derived.values() for case, text in own["hard_cases"].items()},
+        refuted=list(dict.fromkeys(claim["equation"] for claim in found["claims"] if claim["verdict"] == "refuted")),
+        columns=[each for each in found["tally"] if each in ("proved", "refuted") or found["tally"][each]],
         derived=derived,
         proofs={name: proof_of(derivation) for name, derivation in derived.items()},
         sections=_sections(found),
+        counted=counted(found, derived),
+        wrong=list(dict.fromkeys(claim["equation"] for claim in found["claims"] if claim["verdict"] != "proved")),
         mistakes=[{**claim, "marked": _marked(claim)} for claim in mistakes(found, None)],
         accuracy=records.get("accuracy"),
         analysis=analysis,
@@ -97,7 +101,8 @@ def page(
         simulation_speed=speed,
         simulation_tables=speed_tables(speed) if speed else [],
         simulation_pictures=[name for name in sorted(pictures) if name.startswith("simulation")],
-        scenes=scenes(simulation, gallery),
+        scenes=shown,
+        scene_links={scene.name: f"scene-{scene.name.replace('_', '-')}" for scene in shown},
         overview=summary(simulation) if simulation else None,
         frugal=frugality(simulation) if simulation else None,
         photos={scene: b64encode(data).decode() for scene, data in (photos or {}).items()},
@@ -111,7 +116,7 @@ def page(
 
 def _powers(text: str) -> Markup:
     """Powers such as 2^-53 and N m^2 in raised figures, *words* in italics."""
-    text = re.sub(r"(?<=[\w)])\^(-?\d+)", lambda m: f"<sup>{m[1].replace('-', '−')}</sup>", str(escape(text)))
+    text = re.sub(r"(?<=[\w)])\^(-?\d+(?:\.\d+)?)", lambda m: f"<sup>{m[1].replace('-', '−')}</sup>", str(escape(text)))
     return Markup(re.sub(r"(?<!\S)\*(\w+)\*", r"<em>\1</em>", text))
 
 
@@ -132,7 +137,7 @@ def _sections(found: dict[str, Any]) -> list[dict[str, Any]]:
     return [
         {
             "name": name,
-            "anchor": "section-" + (name.lower().replace(" ", "-") or "definitions"),
+            "anchor": anchor_of(name),
             "equations": [
                 {"number": number, "formulas": [_marked(claim) for claim in own.pop("printed").values()], **own}
                 for number, own in equations.items()

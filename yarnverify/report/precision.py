@@ -44,7 +44,9 @@ def precision(result: Mapping[str, Any], timings: Mapping[str, Any]) -> Figure:
     panels[0].set_ylabel("relative error")
     handles, labels = max((axes.get_legend_handles_labels() for axes in panels), key=lambda shown: len(shown[1]))
     labels = [f"{result['compared']}: {label}" for label in labels]
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)), frameon=False)
+    figure.legend(
+        handles, labels, loc="outside upper center", ncols=min(4, len(labels), 2 * len(answers)), frameon=False
+    )
     room = "\n" if len(answers) == 1 else " "
     figure.supxlabel(f"seconds of processor time;{room}numbers beside the marks are {result['size']}", fontsize=8)
     return figure

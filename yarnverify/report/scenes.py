@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from yarnverify.report.simulation import error_text
 from yarnverify.report.table import Table
 
 
@@ -23,6 +24,10 @@ class Shown:
         Name, value with unit, reason.
     runs
         A row a way and size; None for a scene that compares with nothing.
+    command
+        Runs it at the sizes shown, and draws it.
+    pictured
+        What drew its picture, and the scene to turn, where that was a run of its own; else empty.
     """
 
     name: str
@@ -33,17 +38,20 @@ class Shown:
     missed: tuple[str, ...]
     parameters: Table
     runs: Table | None
+    command: str
+    pictured: str = ""
 
 
 def scenes(record: Mapping[str, Any] | None, gallery: Sequence[Mapping[str, Any]] = ()) -> list[Shown]:
     """The scenes of a record, in its order, those to be looked at last, then those results of a gallery that it lacks."""
     recorded = [] if record is None else [*record["scenes"], *record.get("shown", ())]
     known = {each["result"]["scene"] for each in recorded}
-    found = [_shown(each["result"], each.get("timings")) for each in recorded]
-    return [*found, *(_shown(result, None) for result in gallery if result["scene"] not in known)]
+    own = {result["scene"]: result for result in gallery}
+    found = [_shown(each["result"], each.get("timings"), own.get(each["result"]["scene"])) for each in recorded]
+    return [*found, *(_shown(result, None, None) for name, result in own.items() if name not in known)]
 
 
-def _shown(result: Mapping[str, Any], timings: Mapping[str, Any] | None) -> Shown:
+def _shown(result: Mapping[str, Any], timings: Mapping[str, Any] | None, drawn: Mapping[str, Any] | None) -> Shown:
     parameters = tuple(
         (name, f"{_value(own['value'])} {own['unit']}".strip(), own["reason"])
         for name, own in result["parameters"].items()
@@ -57,7 +65,19 @@ def _shown(result: Mapping[str, Any], timings: Mapping[str, Any] | None) -> Show
         tuple(result.get("missed", ())),
         Table("Parameters", ("parameter", "value", "reason or source"), parameters),
         _runs(result, timings) if result["lines"][0]["runs"][0]["answers"] else None,
+        _command(result),
+        _command(drawn, result) if drawn is not None else "",
     )
+
+
+def _command(result: Mapping[str, Any], beside: Mapping[str, Any] | None = None) -> str:
+    """What runs a scene at its sizes, with those parameters that another result has otherwise."""
+    own = result["parameters"]
+    other = {} if beside is None else {key: value["value"] for key, value in beside["parameters"].items()}
+    given = [f"{key}={own[key]['value']}" for key in own if key in other and own[key]["value"] != other[key]]
+    words = ["yarnverify simulate", result["scene"], *(f"--set {each}" for each in given), "--size"]
+    words += [str(run["size"]) for run in result["lines"][0]["runs"]]
+    return " ".join([*words, "--out", f"reports/scenes/{result['scene']}"])
 
 
 def _runs(result: Mapping[str, Any], timings: Mapping[str, Any] | None) -> Table:
@@ -72,7 +92,7 @@ def _runs(result: Mapping[str, Any], timings: Mapping[str, Any] | None) -> Table
             by_name = {answer["name"]: answer for answer in run["answers"]}
             for name in names:
                 answer = by_name.get(name, {"error": None, "order": None})  # not every way has every answer
-                cells += [_error(answer["error"]), "" if answer["order"] is None else f"{answer['order']:.2f}"]
+                cells += [error_text(answer["error"]), "" if answer["order"] is None else f"{answer['order']:.2f}"]
             if timings is not None:
                 cells.append(f"{timings['lines'][number]['runs'][place]['seconds']:.2g}")
             rows.append(tuple(cells))
@@ -84,10 +104,6 @@ def _runs(result: Mapping[str, Any], timings: Mapping[str, Any] | None) -> Table
 def _names(result: Mapping[str, Any]) -> list[str]:
     """Answers of a scene, in the order in which its ways have them."""
     return list(dict.fromkeys(answer["name"] for line in result["lines"] for answer in line["runs"][0]["answers"]))
-
-
-def _error(value: float | None) -> str:
-    return "none" if value is None else "0" if value == 0 else f"{value:.1e}".replace("e-0", "e-").replace("e+0", "e")
 
 
 def _value(value: Any) -> str:

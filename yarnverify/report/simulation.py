@@ -20,7 +20,7 @@ def summary(record: Mapping[str, Any]) -> Table:
         run, name = line["runs"][-1], scene["scene"]
         size, seconds = f"{run['size']} {scene['size']}", _time(timed["runs"][-1]["seconds"])
         for answer in run["answers"]:
-            found = (answer["name"], f"{answer['error']:.1e}", _allowed(answer), _order(answer))
+            found = (answer["name"], error_text(answer["error"]), _allowed(answer), _order(answer))
             rows.append((name, size, *found, str(run["iterations"]), seconds))
             name = size = seconds = ""
     headings = ("scene", "size", "answer", "error", "allowed", "order", "iterations or steps", "time")
@@ -39,7 +39,7 @@ def studies(each: Mapping[str, Any]) -> list[Table]:
         for run, time in zip(line["runs"], times["runs"], strict=True):
             first = (str(run["size"]), str(run["unknowns"]), str(run["iterations"]), _time(time["seconds"]))
             for answer in run["answers"]:
-                value = (_value(answer, "found"), _value(answer, "exact"), f"{answer['error']:.1e}", _order(answer))
+                value = (_value(answer, "found"), _value(answer, "exact"), error_text(answer["error"]), _order(answer))
                 rows.append((*first, answer["name"], *value))
                 first = ("", "", "", "")
         headings = (
@@ -121,6 +121,11 @@ def _moved(own: Mapping[str, Any], way: str) -> str:
         f"; of {own['unknowns']} directions {own['falling']} fall and {own['flat']} stay" if "falling" in own else ""
     )
     return f"no answer: {own['trouble']}{where}"
+
+
+def error_text(value: float | None) -> str:
+    """A relative error as tables have it."""
+    return "none" if value is None else "0" if value == 0 else f"{value:.1e}".replace("e-0", "e-").replace("e+0", "e")
 
 
 def _size(by: float | None) -> str:
