@@ -11,27 +11,26 @@ from yarnverify.symbolic.tree import Expr, Name
 def cancels(shape: Safe) -> bool:
     """Whether terms of both signs are added that are no plain numbers: digits of powers and products are lost there.
 
-    Sums of lengths, sliding coordinates and parameters themselves are formed without loss.
+    Sums of lengths, sliding coordinates and parameters themselves are formed without loss. Second derivatives are left out:
+    where one of them vanishes, the slope beside it in the same block does not.
     """
     positive = {measure.symbol for measure in shape.derivation.measures}
     declared = shape.derivation.section.declared
     positive |= {parameter.name for parameter in declared.parameters if parameter.positive} if declared else set()
-    sums = [node for tree in _scalars(shape) for node in tree.walk() if node.op == "add"]
+    sums = [node for tree in (shape.law, *_slopes(shape)) for node in tree.walk() if node.op == "add"]
     return any(not all(map(_is_plain, node.args)) and _sign(node, positive) == 0 for node in sums)
 
 
 def reach(shape: Safe) -> int:
     """The largest number of lengths, coordinates and parameters that are multiplied with each other."""
-    return max(max(_degrees(tree)) for tree in _scalars(shape))
+    keys = shape.derivation.measures
+    bends = (shape.slopes["tree"](shape.slopes["dd"](key, other)) for key in keys for other in keys)
+    return max(max(_degrees(tree)) for tree in (shape.law, *_slopes(shape), *bends))
 
 
-def _scalars(shape: Safe) -> Iterator[Expr]:
-    """The law and its derivatives by its measures."""
-    yield shape.law
-    keys = list(shape.derivation.measures)
-    for i, key in enumerate(keys):
-        yield shape.slopes["tree"](shape.slopes["d"](key))
-        yield from (shape.slopes["tree"](shape.slopes["dd"](key, other)) for other in keys[i:])
+def _slopes(shape: Safe) -> Iterator[Expr]:
+    """The derivatives of the law by its measures."""
+    return (shape.slopes["tree"](shape.slopes["d"](key)) for key in shape.derivation.measures)
 
 
 def _is_plain(term: Expr) -> bool:
