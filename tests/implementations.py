@@ -333,6 +333,28 @@ def stretch_of_nodes(q: Any, k_s: Any) -> Any:
     return -g[mine], -h[np.ix_(mine, mine)]
 
 
+def stretch_of_weft(q: Any, k_s: Any) -> Any:
+    """Rows x0, x1, u0, v0, u1, v1 of a weft yarn, whose v0, v1 end up in the rows of u."""
+    mine = [0, 1, 2, 3, 4, 5, 7, 9]
+    _, _, h = _of(stretch, q[mine], k_s=k_s)
+    whole = np.zeros((10, 10, q.shape[1]))
+    whole[np.ix_(mine, mine)] = h
+    for row, column in ((7, 9), (9, 7)):
+        whole[row - 1, column - 1], whole[row, column] = whole[row, column], 0.0
+    return {"hessian": whole}
+
+
+def stretch_with_a_step(q: Any, k_s: Any) -> Any:
+    """Minus the squared time step times the Jacobian of the force."""
+    _, g, h = _of(stretch, q, k_s=k_s)
+    return {"force": -g, "hessian": 1e-4 * h}
+
+
+def bending_printed_with_two_stiffnesses(q: Any, k_b: Any) -> Any:
+    _, _, h = printed.evaluate(q, k_b=k_b, errors="mask")
+    return {"x1,x1": 2 * k_b * h[3:6, 3:6]}
+
+
 def bending_single_inside(q: Any, k_b: Any) -> Any:
     e, g, h = _of(bending, q.astype(np.float32), k_b=k_b.astype(np.float32))
     return e.astype(float), g.astype(float), h.astype(float)

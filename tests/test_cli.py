@@ -207,6 +207,18 @@ def test_bad_usage_is_status_2_and_one_line(run: Any, args: tuple[str, ...]) -> 
     assert (status, out) == (2, "") and one_line(err)
 
 
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (("check", "m.py", "--with", "R=d/4", "Y=k_s", "B=1"), "write --with before each: --with Y=k_s --with B=1"),
+        (("prove", "d.md", "more"), "nothing takes more: an option takes the one value right behind it"),
+    ],
+)
+def test_words_that_no_option_takes(run: Any, args: tuple[str, ...], words: str) -> None:
+    status, _, err = run(*args)
+    assert status == 2 and err.strip() == f"yarnverify: {words}"
+
+
 @pytest.mark.parametrize(("error", "status"), [(NotRunError("no viewer here"), 3), (KeyboardInterrupt(), 130)])
 def test_what_could_not_run_has_a_status_of_its_own(
     run: Any, monkeypatch: pytest.MonkeyPatch, error: BaseException, status: int

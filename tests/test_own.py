@@ -66,6 +66,39 @@ def test_a_start_is_whole_and_reports_at_once(started: Path, run: Any) -> None:
         assert run(*check)[0] == 0
 
 
+def test_commands_that_are_told_are_those_that_work_from_here(
+    started: Path, run: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    text = (started / "spring.py").read_text(encoding="utf-8")
+    (tmp_path / "spring.py").write_text(text.replace("document=", "#"), encoding="utf-8")
+    assert "made by: yarnverify generate " + str(tmp_path) in run("accuracy", str(tmp_path))[2]
+    monkeypatch.chdir(tmp_path)
+    assert run("accuracy", ".")[2].endswith("made by: yarnverify generate .\n")
+
+
+def test_what_is_not_proved_of_one_energy_leaves_the_others_theirs(
+    tmp_path: Path, run: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from yarnverify.errors import NotRunError
+    from yarnverify.symbolic import modules
+
+    def proved(energy: Any, declarations: Any) -> Any:
+        if energy.name == "second":
+            raise NotRunError("second: derived block dF_x0/dx0 is undecided: too long")
+        return real(energy, declarations)
+
+    real = modules.proved
+    monkeypatch.setattr(modules, "proved", proved)
+    body = "(x0: Point, *, k: Positive['N/m']):\n    return k * square(x0)\n\n"
+    (tmp_path / "two.py").write_text(f"{HEAD}\n@energy\ndef first{body}@energy\ndef second{body}", encoding="utf-8")
+    status, out, _ = run("generate", str(tmp_path), "--no-cache")
+    assert status == 1 and (tmp_path / "kernels" / "first.py").is_file()
+    assert "second: derived block dF_x0/dx0 is undecided: too long; it gets no kernels" in out
+    assert not (tmp_path / "kernels" / "second.py").exists()
+    status, out, _ = run("report", str(tmp_path))
+    assert status == 1 and "it gets no kernels" in out and (tmp_path / "reports" / "first.md").is_file()
+
+
 def test_the_examples_of_a_start_run(started: Path, run: Any) -> None:
     run("generate", "my_model")
     text = (started / "README.md").read_text(encoding="utf-8")

@@ -288,5 +288,7 @@ def test_laws_without_a_safe_form_say_so(declarations: Any) -> None:
         return k * Expr("call", (angle(x1 - x0, x0 - x2) / 3,), "sin")
 
     programs, notes = derived_programs(odd, proved(odd, Declarations((odd,))), "accurate")
-    assert notes == ["there is no safe form for this law; these are the differentiated formulas"]
+    assert notes == [
+        "no law of lengths and one angle of segments: differentiated step by step, which promises no digits"
+    ]
     assert len(programs) == 1 and replace(programs[0]) == programs[0]

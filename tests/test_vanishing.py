@@ -177,14 +177,14 @@ def test_what_is_not_promised_is_lost(kernels: Any) -> None:
 )
 def test_a_wrong_difference_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch, wrong: Any) -> None:
     energy = next(e for e in load_declarations(folder).energies if e.name == "hencky")
-    monkeypatch.setattr(vanishing, "_logarithm", wrong)
+    monkeypatch.setattr(vanishing, "logarithm_of", wrong)
     with pytest.raises(NotRunError, match=r"hencky, smooth shape: derived block .* is refuted"):
         proved(energy, Declarations((energy,), (), ()))
 
 
 def test_a_wrong_exponential_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     energy = next(e for e in load_declarations(folder).energies if e.name == "fibre")
-    monkeypatch.setattr(vanishing, "_sum", lambda value: vanishing.expm1(sp.S.One))
+    monkeypatch.setattr(vanishing, "sum_of", lambda value: vanishing.expm1(sp.S.One))
     with pytest.raises(NotRunError, match="fibre, smooth shape: derived block"):
         proved(energy, Declarations((energy,), (), ()))
 

@@ -39,6 +39,8 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")  # a terminal without Greek letters still gets the result
     try:
         app(sys.argv[1:], error_formatter=lambda error: f"yarnverify: {error}", exit_on_error=False, print_error=False)
+    except cyclopts.UnusedCliTokensError as error:
+        stop(f"yarnverify: {_unused(error.unused_tokens or [''], sys.argv[1:])}")
     except cyclopts.CycloptsError as error:
         stop(f"yarnverify: {' '.join(str(error).split())}")
     except InputError as error:
@@ -54,3 +56,12 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)
+
+
+def _unused(words: list[str], given: list[str]) -> str:
+    """What to do about words that no option took."""
+    before = given[: given.index(words[0])] if words[0] in given else []
+    option = next((word for word in reversed(before) if word.startswith("--")), "")
+    if option and all("=" in word for word in words):
+        return f"write {option} before each: {' '.join(f'{option} {word}' for word in words)}"
+    return f"nothing takes {' '.join(words)}: an option takes the one value right behind it"

@@ -122,9 +122,10 @@ def generate_kernels(
     stale = sorted(
         name for name in there - set(texts) - by_hand if not place.own or _is_generated(place.kernels / name)
     )
-    outcome = settle_files(place.kernels, texts, check, stale, place.command("yarnverify generate"))
+    outcome = settle_files(place.kernels, texts, check, stale, place.here("yarnverify generate"))
     outcome.record = made["operations"]
-    outcome.lines += made["notes"]
+    outcome.lines += made["notes"] + made["failed"]
+    outcome.differs |= bool(made["failed"])
     return outcome
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from yarnverify.errors import InputError
+from yarnverify.files import as_seen
 from yarnverify.library import declared_documents, derivations, prints_formulas
 
 
@@ -52,8 +53,12 @@ class Project:
         return f"{self.name}/" if self.own else ""
 
     def command(self, words: str) -> str:
-        """A command line for this folder: ``yarnverify prove`` becomes ``yarnverify prove NAME``."""
+        """A command line for this folder, for pages: ``yarnverify prove`` becomes ``yarnverify prove NAME``."""
         return f"{words} {self.name}".strip()
+
+    def here(self, words: str) -> str:
+        """The same for a person at the terminal, who may have called from anywhere."""
+        return f"{words} {as_seen(self.folder)}" if self.own else words
 
 
 def project(folder: Path | None = None) -> Project:

@@ -87,7 +87,7 @@ def build_report(
     there -= {f"records/{name}.json" for name in MEASURED}
     if not check:  # made from the same records at any time, and so not kept under version control
         texts["report.html"] = _page(records | measured, out, of.name)
-    outcome = settle_files(out, texts, check, sorted(there - set(texts)), of.command("yarnverify report"))
+    outcome = settle_files(out, texts, check, sorted(there - set(texts)), of.here("yarnverify report"))
     outcome.lines = [*lines, *outcome.lines]
     outcome.record = {
         "tally": records["verdicts"]["tally"],
@@ -180,7 +180,7 @@ def _sweep(of: Project, out: Path, advance: Callable[[str, int], None]) -> tuple
         measured = accuracy((), (), "quick", "processes", None, None, out, True, False, advance, of)
     except NotRunError as error:
         return [f"Not measured: {error}"], True
-    return [*missed_targets(measured.record), measured.lines[-1]], not measured.differs
+    return [*missed_targets(measured.record, of.here("yarnverify accuracy")), measured.lines[-1]], not measured.differs
 
 
 def _records(of: Project, check: bool, advance: Callable[[str, int], None]) -> tuple[dict[str, Any], list[str], bool]:

@@ -30,7 +30,7 @@ def sweep(
     units, missing = plan(PROFILES[profile], energies, variants, of.folder if of.own else None)
     if not units:
         made = (
-            f"; they are made by: {of.command('yarnverify generate')}"
+            f"; they are made by: {of.here('yarnverify generate')}"
             if of.own and "no such kernel" in str(missing)
             else ""
         )
@@ -81,7 +81,7 @@ def accuracy(
     names = list(dict.fromkeys(cell["energy"] for cell in record["cells"]))
     for name in () if check else names:
         outcome.lines += [f"{name}", "", accuracy_table(record, name)]
-    problems = missed_targets(record)
+    problems = missed_targets(record, of.here("yarnverify accuracy"))
     if known is not None:
         problems += grown(known, record, whole=not part)
     if write:

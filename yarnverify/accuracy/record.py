@@ -75,10 +75,9 @@ def key_of(cell: dict[str, Any]) -> tuple[str, str, str, str]:
     return cell["energy"], cell["variant"], cell["dtype"], cell["regime"]
 
 
-def missed_targets(record: dict[str, Any]) -> list[str]:
-    """One line for each output of a cell whose error exceeds its target."""
+def missed_targets(record: dict[str, Any], command: str = "yarnverify accuracy") -> list[str]:
+    """One line for each output of a cell whose error exceeds its target, with the ``command`` that replays it."""
     lines = []
-    command = record.get("command", "yarnverify accuracy").partition(" --profile")[0]
     for cell in record["cells"]:
         name = ", ".join(key_of(cell))
         if cell["target"] is None:

@@ -83,7 +83,7 @@ def benchmark(
         raise InputError(f"{energy}: no such energy; there are {', '.join(each.name for each in declared)}")
     folder = of.folder if of.own else None
     if folder is not None and not any(has_kernel("fast", each.name, folder) for each in chosen):
-        raise NotRunError(f"{of.name}: has no kernels of these; they are made by: {of.command('yarnverify generate')}")
+        raise NotRunError(f"{of.name}: has no kernels of these; they are made by: {of.here('yarnverify generate')}")
     _check(sizes, peers, threads, rounds)
     sizes = sorted(set(sizes))
     # one thread waits for nobody, so that its processor time is its wall time less what other programs took

@@ -4,12 +4,13 @@
     expressions.py  what an argument is in terms of this energy's: ``R = d/4``
     setting.py      what a person says about it, and the states and arguments that follow
     cases.py        the states, with their true results and condition numbers
-    exchange.py     states and results as JSON, NPZ or CSV
+    exchange.py     states and results as files; formats.py has their kinds: JSON, NPZ, MATLAB, CSV
     child.py        the other process: calls a Python function or a C function, state by state
     running.py      starts it; a crash or a hang is found, not suffered
     sources.py      where results come from: functions, a command line, a file
     judge.py        each block: pass or fail, by one rule
     recognise.py    what is wrong: another formula (``formula.py``, ``factors.py``), or lost digits (``digits.py``)
+    laws.py         other laws that people take for an energy's own, in one table; measures.py finds their place in its formula
     hints.py        other conventions under which it would be right
     show.py         the tables; command.py puts all of it together
 

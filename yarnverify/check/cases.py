@@ -74,7 +74,7 @@ class Cases:
         parts = np.vstack([self.truth.energy[None], self.truth.gradient, self.truth.hessian.reshape(-1, n)])
         return np.asarray(self.truth.has_derivatives & ~(np.abs(parts) > largest).any(axis=0))
 
-    @property
+    @cached_property
     def shorter(self) -> Array | None:
         """(n,) bool: where the only edge is no longer than the only difference of sliding coordinates; None without these."""
         shape = shape_of(self.energy)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from yarnverify.accuracy.regimes import vector_parameters
 from yarnverify.check.cases import Cases
 from yarnverify.check.conventions import Convention, Results, decoded
-from yarnverify.check.hints import factor_hints, order_hint, sign_hints
+from yarnverify.check.hints import argument_hint, factor_hints, order_hint, sign_hints, stray_hints
 from yarnverify.check.judge import Block, judged, narrowed
 from yarnverify.check.recognise import Diagnosis, Judge
 from yarnverify.check.running import Ran
 from yarnverify.check.setting import Options, Setting, energy_of
-from yarnverify.check.sources import called, from_files
+from yarnverify.check.sources import Again, called, from_files
 from yarnverify.errors import InputError
 
 Array = NDArray[Any]
@@ -79,7 +79,7 @@ def check(
     command, outputs
         Instead of a target: a command line with ``{in}`` and ``{out}``, or a file with results.
     kind
-        Of the files of a command: json, npz or csv.
+        Of the files of a command: json, npz, mat or csv.
 
     Raises
     ------
@@ -102,19 +102,19 @@ def check(
     if target is not None:
         ran, convention, run_again = called(target, setting, options, q, values, notes, advance)
     else:
-        ran, convention = from_files(command, outputs, kind, setting, options, q, values)
+        ran, convention = from_files(command, outputs, kind, setting, options, q, values, notes)
     name = target or command or str(outputs)
     if convention is None:
         return Checked(
             name, setting.cases, setting.convention, [], _troubles(ran, setting.cases), ran.left, notes=notes
         )
     ours = options.derivations is None
-    return _judged(name, setting.cases, convention, ran, notes, ours, run_again, advance)
+    return _judged(name, setting.cases, convention, ran, notes, ours, run_again, setting.given, advance)
 
 
 def _judged(
     name: str, cases: Cases, convention: Convention, ran: Ran, notes: list[str], ours: bool,
-    again: Callable[[Array, Array], Array | None] | None, advance: Advance,
+    again: Again | None, said: Mapping[str, str], advance: Advance,
 ) -> Checked:  # fmt: skip
     results = decoded(ran.flat, convention, cases.dof)
     blocks = judged(results, cases, ran.done)
@@ -141,9 +141,12 @@ def _judged(
             (diagnosis.status == "wrong" and not diagnosis.reasons) or diagnosis.status == "no value"
             for _, diagnosis in found
         )
+        nothing = not any(diagnosis.status != "wrong" and block.judged.any() for block, diagnosis in found)
+        if again is not None and nothing and not checked.hints:
+            checked.hints = argument_hint(convention, cases, again, said)
         if again is not None and unknown and not checked.hints:
-            by_name = bool(ran.decided and ran.decided.get("by_name"))
-            checked.hints = order_hint(convention, cases, again, by_name)
+            checked.hints = order_hint(convention, cases, again)
+        checked.hints += stray_hints(found, results.stray)
     return checked
 
 

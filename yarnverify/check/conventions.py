@@ -105,6 +105,8 @@ class Results:
         ``E``, ``G``, ``H`` to bool arrays of the shape of one state: what is returned at all.
     extra
         Labels of coordinates that the energy does not have to the largest size of what is returned for them, which must be 0.
+    stray
+        The same to what is returned, (n,), where it is not all zero.
     """
 
     energy: Array
@@ -112,6 +114,7 @@ class Results:
     hessian: Array
     given: dict[str, Array]
     extra: dict[str, float] = field(default_factory=dict)
+    stray: dict[str, Array] = field(default_factory=dict)
 
     def part(self, kind: str) -> Array:
         return {"E": self.energy, "G": self.gradient, "H": self.hessian}[kind]
@@ -279,3 +282,5 @@ def _put(results: Results, convention: Convention, places: tuple[int, ...], valu
         with np.errstate(invalid="ignore"):
             worst = float(np.max(np.where(np.isnan(value), 0.0, np.abs(value)))) if value.size else 0.0
         results.extra[label] = max(worst, results.extra.get(label, 0.0))
+        if worst:
+            results.stray[label] = value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from yarnverify.accuracy.truth import truth
 from yarnverify.check.cases import Cases, angles
 from yarnverify.check.factors import Factor, curvatures, factor, number_text, quantities, ratio, terms
 from yarnverify.check.judge import Block
+from yarnverify.check.laws import Laws
 from yarnverify.symbolic.declare import Energy
 
 Array = NDArray[Any]
@@ -50,10 +51,14 @@ class Formula:
         What was tried, and everything that came back.
     printed
         Gives G and H of the document's own formulas, None where there are none.
+    plain
+        (n,) bool: where nothing is hard.
     """
 
-    def __init__(self, cases: Cases, blocks: list[Block], printed: Callable[[], dict[str, Array] | None]) -> None:
-        self.cases, self.blocks, self._printed = cases, blocks, printed
+    def __init__(
+        self, cases: Cases, blocks: list[Block], printed: Callable[[], dict[str, Array] | None], plain: Array
+    ) -> None:
+        self.cases, self.blocks, self._printed, self.plain = cases, blocks, printed, plain
         self.tolerance = 1e-3 if cases.dtype == "float32" else 1e-6
         self.angle = angles(cases)
         self._quantities: dict[str, Array] | None = None
@@ -64,9 +69,33 @@ class Formula:
             self._quantities = quantities(self.cases)
         return {name: value[at] for name, value in self._quantities.items()}
 
+    @cached_property
+    def laws(self) -> Laws:
+        """Other laws, and what follows from the energy that came where that is the true one times something."""
+        laws = Laws(self.cases, self.blocks, self.plain, self.tolerance)
+        for block in self.blocks:
+            at = self.plain & block.judged & np.isfinite(block.computed).all(axis=0)
+            if block.kind == "E" and at.any():
+                known = self._factor(
+                    ratio(block.computed[:, at], block.true[:, at], self.tolerance), np.flatnonzero(at)
+                )
+                if known is not None:
+                    laws.follow(known)
+        return laws
+
+    def _factor(self, found: Array | None, where: Array) -> Factor | None:
+        """A ratio as a product of quantities."""
+        if found is None:
+            return None
+        other = {name: value[where] for name, value in curvatures(self.cases).items()}
+        return factor(found, self.named(where), self.tolerance) or factor(found, other, self.tolerance)
+
     def mistake(self, block: Block, at: Array) -> Mistake:
         """What a block is instead of what it should be; a wrong sign besides another mistake is seen through."""
         computed, true = block.computed[:, at], block.true[:, at]
+        law = self.laws.of(block)
+        if law is not None:
+            return _signed(law.text, law.sign)
         live = np.abs(true).max(axis=0) > 0
         if not np.any(computed):
             return Mistake("is zero, as if left out")
@@ -74,12 +103,9 @@ class Formula:
             return Mistake("is not zero, as it should be")
         where = np.flatnonzero(at)[live]
         found = ratio(computed[:, live], true[:, live], self.tolerance)
-        if found is not None:
-            known = factor(found, self.named(where), self.tolerance) or factor(
-                found, {name: value[where] for name, value in curvatures(self.cases).items()}, self.tolerance
-            )
-            if known is not None:
-                return Mistake(_factor_text(known), known, 1 if known.number > 0 else -1)
+        known = self._factor(found, where)
+        if known is not None:
+            return Mistake(_factor_text(known), known, 1 if known.number > 0 else -1)
         for sign in (1, -1):
             if found is not None:
                 text = self._right_angle(sign * found, where) or self._rounded(sign * found, where)
@@ -123,10 +149,10 @@ class Formula:
         if self._same(values, block.true[:, at]) or not values.any(axis=0).all():
             return None
         found = ratio(computed, values, self.tolerance)
-        known = None if found is None else factor(found, {}, self.tolerance)
+        known = None if found is None else factor(found, self.named(np.flatnonzero(at)), self.tolerance)
         if known is None or known.number < 0:
             return None
-        size = "" if abs(known.number - 1) < self.tolerance else f", times {number_text(known.number)}"
+        size = "" if str(known) == "1" else f", times {known}"
         sign = 1 if np.array_equal(computed, block.computed[:, at]) else -1
         text = f"is what the document prints, misprint included{equation_of(self.cases.energy, block.name)}{size}"
         return _signed(text, sign)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import permutations
 from typing import Any
@@ -16,10 +16,12 @@ from yarnverify.check.conventions import Convention, Results, Row, decoded
 from yarnverify.check.factors import number_text
 from yarnverify.check.judge import Block
 from yarnverify.check.recognise import Diagnosis
+from yarnverify.check.sources import Again
 
 Array = NDArray[Any]
 Found = Sequence[tuple[Block, Diagnosis]]
 _TRIED = 6  # states that an order is tried at
+_ARGUMENTS = 4  # that are tried in every order
 
 
 def sign_hints(found: Found, convention: Convention, fails: Callable[[Convention], int]) -> list[str]:
@@ -85,8 +87,14 @@ def _flag(flag: str, taken: bool, named: list[str]) -> str:
 def factor_hints(found: Found, cases: Cases) -> list[str]:
     """Another meaning of the stiffness, where everything is off by the same factor."""
     wrong = [(block, diagnosis) for block, diagnosis in found if diagnosis.status == "wrong"]
-    right = [block for block, diagnosis in found if diagnosis.status != "wrong" and diagnosis.sign and _live(block)]
-    if right or not wrong or any(diagnosis.factor is None for _, diagnosis in wrong):
+    if not wrong or any(diagnosis.factor is None for _, diagnosis in wrong):
+        return []
+    kinds = {block.kind for block, _ in wrong}
+    right = {
+        block.kind for block, diagnosis in found if diagnosis.status != "wrong" and diagnosis.sign and _live(block)
+    }
+    only = kinds == {"H"} and kinds.isdisjoint(right) and any(block.kind != "H" for block, _ in found)
+    if right and not only:
         return []
     texts = {str(diagnosis.factor).lstrip("-") for _, diagnosis in wrong}
     name = next(iter(shape_of(cases.energy).others), None)
@@ -99,10 +107,58 @@ def factor_hints(found: Found, cases: Cases) -> list[str]:
         return []
     size = number_text(abs(first.number), expression=True)
     size = size if size.isalnum() else f"({size})"
-    only = {block.kind for block, _ in wrong} == {"H"} and any(block.kind != "H" for block, _ in found)
     if only:
-        return [f"the whole Hessian is {texts.pop()} times what it should be: a time step squared?"]
+        text = texts.pop()
+        return [
+            f"the whole Hessian is {text} times what it should be; if that is a squared time step, call it with a step of 1"
+        ]
     return [f"everything is {texts.pop()} times this energy; if your stiffness means that: --with {name}={name}/{size}"]
+
+
+def argument_hint(convention: Convention, cases: Cases, again: Again, said: Mapping[str, str]) -> list[str]:
+    """An order of the arguments under which the results are right.
+
+    Parameters
+    ----------
+    convention, cases
+        As they were tried.
+    again
+        The implementation.
+    said
+        What each argument is, by name, as a person said it.
+    """
+    names = list(again.positions)
+    at = np.flatnonzero(cases.of_regime("moderate"))[:_TRIED]
+    others = list(permutations(names))[1:] if len(names) <= _ARGUMENTS else []
+    if not at.size or not others:
+        return []
+    many = np.tile(at, len(others))
+    passed = {name: np.concatenate([again.positions[order[i]][at] for order in others]) for i, name in enumerate(names)}
+    flat = again.run(again.states[many], many, passed)
+    for number, order in enumerate(others if flat is not None else ()):
+        assert flat is not None
+        results = decoded(flat[number * at.size : (number + 1) * at.size], convention, cases.dof)
+        signs = _signs(results, cases, at, every=False)
+        if signs:
+            words = " ".join(f"--with {name}={said.get(name, name)}" for name in order)
+            better = "matches" if signs == _signs(results, cases, at) else "more is right"
+            return [f"{better} with the arguments in another order: {words}{_flags(signs, convention)}"]
+    return []
+
+
+def stray_hints(found: Found, stray: Mapping[str, Array]) -> list[str]:
+    """Numbers that came in the row or column of a coordinate that the energy does not have."""
+    texts, left = [], dict(stray)
+    for block, _ in found:
+        if block.kind != "H" or block.computed.shape[0] != 1 or block.computed.any():
+            continue
+        for label, values in left.items():
+            at = block.judged & np.isfinite(values) & (block.true[0] != 0)
+            if at.any() and np.abs(np.abs(values[at] / block.true[0, at]) - 1).max() < 1e-3:
+                texts.append(f"the Hessian {block.name.replace(',', ', ')} came in the place of {label}")
+                del left[label]
+                break
+    return texts
 
 
 def orders(convention: Convention, cases: Cases) -> list[tuple[str, tuple[Row, ...]]]:
@@ -129,19 +185,15 @@ def orders(convention: Convention, cases: Cases) -> list[tuple[str, tuple[Row, .
     return [(text, tuple(by_name[label] for label in labels)) for labels, text in found.items() if labels != now]
 
 
-def order_hint(
-    convention: Convention, cases: Cases, run: Callable[[Array, Array], Array | None], by_name: bool
-) -> list[str]:
+def order_hint(convention: Convention, cases: Cases, again: Again) -> list[str]:
     """An order of the unknowns under which the results are right.
 
     Parameters
     ----------
     convention, cases
         As they were tried.
-    run
-        Calls the implementation: (m, rows) of states, and the number of the case that each is of; gives (m, total) or None.
-    by_name
-        Whether it takes its unknowns by name, so that the hint is about names.
+    again
+        The implementation; if it takes its unknowns by name, the hint is about names.
     """
     if any(row.index is None for row in convention.rows):
         return []
@@ -151,7 +203,7 @@ def order_hint(
         return []
     places = [[row.index for row in rows if row.index is not None] for _, rows in candidates]
     states = np.vstack([cases.points.q[place][:, at].T for place in places])
-    flat = run(states, np.tile(at, len(candidates)))
+    flat = again.run(states, np.tile(at, len(candidates)), {})
     if flat is None:
         return []
     for number, (text, rows) in enumerate(candidates):
@@ -162,7 +214,7 @@ def order_hint(
             return []
         if signs:
             flags = _flags(signs, convention)
-            if by_name:
+            if again.by_name:
                 pairs = [
                     (old.label, new.label)
                     for old, new in zip(convention.rows, rows, strict=True)
@@ -184,8 +236,8 @@ def _flags(signs: dict[str, int], convention: Convention) -> str:
     return "".join(words)
 
 
-def _signs(results: Results, cases: Cases, at: Array) -> dict[str, int]:
-    """The sign under which each output is right to six digits; empty if one is under neither."""
+def _signs(results: Results, cases: Cases, at: Array, every: bool = True) -> dict[str, int]:
+    """The sign under which each output is right to six digits; empty if one is under neither, and ``every`` one must be."""
     found = {}
     for kind, true in (("E", cases.truth.energy), ("G", cases.truth.gradient), ("H", cases.truth.hessian)):
         given = results.given[kind]
@@ -199,5 +251,6 @@ def _signs(results: Results, cases: Cases, at: Array) -> dict[str, int]:
                 found[kind] = sign
                 break
         else:
-            return {}
+            if every:
+                return {}
     return found

@@ -54,7 +54,7 @@ class Judge:
         self.cases = cases
         plain = cases.of_regime("moderate") & cases.truth.has_derivatives
         self.plain = plain if plain.any() else cases.truth.has_derivatives
-        self.formula, self.digits = Formula(cases, blocks, printed), Digits(cases)
+        self.formula, self.digits = Formula(cases, blocks, printed, self.plain), Digits(cases)
 
     def diagnosis(self, block: Block) -> Diagnosis:
         """What is wrong with a block; nothing if it passes."""
@@ -83,7 +83,11 @@ class Judge:
             return Diagnosis("wrong", (found.text,) if found.text else (), found.factor, found.sign)
         middle = float(np.median(relative[finite])) if finite.any() else 0.0
         if middle > _APPROXIMATE * UNIT[self.cases.dtype] and (fails & finite).sum() * 2 > finite.sum():
-            text = self.formula.rounded_right_angle(block, finite) or self.digits.precision(block, finite, middle)
+            text = (
+                self.formula.rounded_right_angle(block, finite)
+                or self.formula.laws.added(block, finite)
+                or self.digits.precision(block, finite, middle)
+            )
             return Diagnosis("approximate", (text,), None, 1)
         if not finite.any() and plain.any():
             return Diagnosis("no value", ("is NaN or infinite even where nothing is hard",))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import shlex
 import subprocess
 import tempfile
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from yarnverify.check.conventions import Convention
-from yarnverify.check.exchange import key_of, kind_of, read_results, write_inputs
+from yarnverify.check.exchange import key_of, read_results, write_inputs
+from yarnverify.check.formats import format_of
 from yarnverify.check.running import Ran, ending, run_target
 from yarnverify.check.setting import Options, Setting
 from yarnverify.errors import InputError, NotRunError
@@ -25,6 +26,29 @@ LIBRARIES = (".so", ".dylib", ".dll")
 WHOLE = ("energy", "gradient", "hessian")
 
 
+@dataclass(frozen=True)
+class Again:
+    """An implementation that can be called once more.
+
+    Attributes
+    ----------
+    run
+        Takes (m, rows) of states, the number of the case that each is of, and (m,) of arguments that are to be others; gives
+        (m, total), or None where it does not come back.
+    by_name
+        Whether it takes its unknowns by name.
+    states
+        (n, rows) as it was called with.
+    positions
+        What it was passed after the state, in order and not by name: (n,) by what a person called it.
+    """
+
+    run: Callable[[Array, Array, Mapping[str, Array]], Array | None]
+    by_name: bool
+    states: Array
+    positions: Mapping[str, Array]
+
+
 def called(
     target: str,
     setting: Setting,
@@ -33,7 +57,7 @@ def called(
     values: dict[str, Array],
     notes: list[str],
     advance: Advance,
-) -> tuple[Ran, Convention | None, Callable[[Array, Array], Array | None] | None]:
+) -> tuple[Ran, Convention | None, Again | None]:
     place = target.rpartition(":")[0] if ":" in target[2:] else target
     library = Path(place).suffix in LIBRARIES
     if library and (place == target or not target.rpartition(":")[2]):
@@ -72,13 +96,14 @@ def called(
     if ran.decided["dtype"] == "float32" and setting.cases.dtype == "float64":
         notes.append("gives float32: hold it to single precision with --float32")
 
-    def again(states: Array, at: Array) -> Array | None:
+    def run(states: Array, at: Array, others: Mapping[str, Array]) -> Array | None:
         by_row = states.T
         repeated = {name: value[at] for name, value in values.items()}
         columns = {row.label: by_row[i] for i, row in enumerate(setting.rows)}
         for label, rows in setting.cases.labels:
             parts = [columns[f"{label}.{axis}"] for axis in "xyz"] if rows.stop - rows.start == 3 else [columns[label]]
             repeated[label] = np.column_stack(parts) if len(parts) == 3 else parts[0]
+        repeated |= others
         try:
             found = run_target(
                 {**task, "layout": convention.layout}, states, repeated, [(0, len(states))], options.time_limit
@@ -87,7 +112,8 @@ def called(
             return None
         return found.flat if found.decided is not None and found.flat.shape[1] == ran.flat.shape[1] else None
 
-    return ran, convention, again
+    positions = {name: values[name] for name in setting.parameters} if library else {}
+    return ran, convention, Again(run, bool(ran.decided.get("by_name")), q, positions)
 
 
 def _manner(layout: str) -> str:
@@ -104,16 +130,12 @@ def from_files(
     options: Options,
     q: Array,
     values: dict[str, Array],
+    notes: list[str],
 ) -> tuple[Ran, Convention | None]:
     given = {name: values[name] for name in setting.parameters}
-    key = key_of(q, given)
-    wanted = [(output.name, output.size) for output in setting.outputs(options.returns or WHOLE)]
-    n = len(setting.cases)
+    key, n = key_of(q, given), len(setting.cases)
     if outputs is not None:
-        if kind_of(outputs, "--outputs") == ".csv" and not options.returns:
-            wanted = _fitting(outputs, wanted)
-        names, flat = read_results(outputs, wanted, n, key, bool(options.returns))
-        return Ran(flat, np.ones(n, bool), {}), replace(setting.convention, outputs=setting.outputs(names))
+        return _results(outputs, setting, options, key, notes)
     assert command is not None
     if "{in}" not in command or "{out}" not in command:
         raise InputError("--command: must hold {in} and {out}, the files that it reads and writes")
@@ -136,9 +158,20 @@ def from_files(
             return Ran(np.zeros((n, 0)), np.zeros(n, bool), None, {0: text}), None
         if not sink.exists():
             raise InputError(f"--command: wrote no file {sink.name}")
-        if kind == "csv" and not options.returns:
-            wanted = _fitting(sink, wanted)
-        names, flat = read_results(sink, wanted, n, key, bool(options.returns))
+        return _results(sink, setting, options, key, notes)
+
+
+def _results(path: Path, setting: Setting, options: Options, key: str, notes: list[str]) -> tuple[Ran, Convention]:
+    """What a file holds: what a person says, or else all outputs that it has by name, or that fill a line of a CSV file."""
+    by_line = format_of(path, "--outputs").read is None
+    names: Sequence[str] = options.returns or (WHOLE if by_line else (*WHOLE, "force", "jacobian"))
+    wanted = [(output.name, output.size) for output in setting.outputs(names)]
+    if by_line and not options.returns:
+        wanted = _fitting(path, wanted)
+    n = len(setting.cases)
+    names, flat = read_results(path, wanted, n, key, bool(options.returns))
+    if not options.returns:
+        notes.append(f"taken as: {', '.join(names)}")
     return Ran(flat, np.ones(n, bool), {}), replace(setting.convention, outputs=setting.outputs(names))
 
 

@@ -76,7 +76,7 @@ def _with_kernels(of: Project, variant: str) -> list[str]:
     names = [energy.name for energy in load_declarations(of.folder).energies]
     found = [name for name in names if has_kernel(variant, name, of.folder)]
     if not found:
-        raise NotRunError(f"{of.name}: has no {variant} kernels; they are made by: {of.command('yarnverify generate')}")
+        raise NotRunError(f"{of.name}: has no {variant} kernels; they are made by: {of.here('yarnverify generate')}")
     return found
 
 

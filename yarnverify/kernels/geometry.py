@@ -287,6 +287,21 @@ def turning(sine_squared: Any, cosine: Any) -> tuple[Any, Any, Any]:
     return squared, over, near_g + select(open_side, 0.0, straight * near * inverse)
 
 
+def angle_squared(sine_squared: Any, cosine: Any) -> Any:
+    """``t^2``; see ``turning``."""
+    return turning(sine_squared, cosine)[0]
+
+
+def angle_over_sine(sine_squared: Any, cosine: Any) -> Any:
+    """``t/sin t``; see ``turning``."""
+    return turning(sine_squared, cosine)[1]
+
+
+def sine_excess(sine_squared: Any, cosine: Any) -> Any:
+    """``(sin t - t cos t)/sin(t)^3``; see ``turning``."""
+    return turning(sine_squared, cosine)[2]
+
+
 def pi_like(value: Any) -> Any:
     """pi to as many digits as ``value`` has."""
     return value.pi() if hasattr(value, "pi") else PI

@@ -25,8 +25,8 @@ In the order of work::
     corner, safe, safe_laws,    the same blocks rearranged so that they have no 0/0, proved again
       vanishing, radicals,
       safe_program
-    steps, emit, sums,          reading 3: straight-line programs, their text, which of them a variant consists of,
-      printing, programs,         and the modules that hold them
-      modules
+    steps, emit, sums,          reading 3: straight-line programs, also of energies without safe forms; their text,
+      vector_angles, printing,    which of them a variant consists of, and the modules that hold them
+      programs, modules
     c_functions, c_source       the same programs as C
 """

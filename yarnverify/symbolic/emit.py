@@ -225,10 +225,12 @@ def _entry(value: Value, a: int, b: int, row: bool, column: bool) -> Any:
     return value
 
 
-def length_checks(energy: Energy, section: Section, reading: Components, more: str) -> Iterable[Check]:
-    """The lengths that the energy is made of."""
+def length_checks(
+    energy: Energy, section: Section, reading: Components, more: str, but: Iterable[Expr] = ()
+) -> Iterable[Check]:
+    """The lengths that the energy is made of, ``but`` those that may be zero."""
     tree = section.expand(energy.expression)
-    for node in dict.fromkeys(n for n in tree.walk() if n.op == "norm"):
+    for node in dict.fromkeys(n for n in tree.walk() if n.op == "norm" and n not in but):
         if section.type_of(node.args[0]).value == "vector":
             ends = [n.name for n in node.args[0].walk() if n.op == "symbol"]
             yield reading.value(node), "energy", zero_length(ends, more)

@@ -167,7 +167,8 @@ def _plain_steps(energy: Energy) -> list[Step]:
     count = sum(3 if name.bold else 1 for name in energy.unknowns)
     note = (
         "This energy is not a law of known measures, which are lengths of segments and angles between them: it is "
-        f"differentiated by each of its {count} coordinates, through every sum and function that it is made of."
+        f"differentiated by each of its {count} coordinates, through every sum and function that it is made of, and through "
+        "angles between other vectors by rules that hold where these are zero."
     )
     return [_step("Plain differentiation", note, [])]
 

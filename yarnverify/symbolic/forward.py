@@ -26,7 +26,7 @@ from yarnverify.symbolic.functions import is_turn, unfolded
 from yarnverify.symbolic.jets import Jet
 from yarnverify.symbolic.linear import linear_form, tree_of
 from yarnverify.symbolic.numbers import Balls, Floats
-from yarnverify.symbolic.tree import FORCE, PI, ZERO, Expr, Name
+from yarnverify.symbolic.tree import FORCE, PI, ZERO, Expr, Name, Type
 from yarnverify.symbolic.turns import DRAWN_PARTS, Pair, multiple, of_pi, scaled, turned
 
 State = Mapping[Name, Any]  # a Fraction for a scalar, three for a point
@@ -149,6 +149,8 @@ class Evaluation:
             return self._atan2(y, x)
         if op == "call" and (plain := unfolded(expr)) is not None:
             return self._value(plain, jets)
+        if op == "call" and expr.value == "cos" and not self.numbers.exact and (known := self._cosine_of(expr.args[0])):
+            return self._value(known, jets)
         if op == "call" and expr.value != "arccos":
             sine, cosine = self._circle(expr.args[0], jets)
             return {"sin": lambda: sine, "cos": lambda: cosine, "tan": lambda: sine / _nonzero(cosine)}[
@@ -157,6 +159,11 @@ class Evaluation:
         if op == "pow" and jets and isinstance(self.numbers, Balls) and expr.value in _EVEN:
             square = self._square(expr.args[0])
             return square if expr.value == 2 else self._power(square, int(str(expr.value)) // 2)
+        if op == "mul" and jets and isinstance(self.numbers, Balls):
+            twice = next((arg for arg in expr.args if expr.args.count(arg) == 2 and arg.op == "call"), None)
+            if twice is not None:
+                rest = [self._value(arg, jets) for arg in expr.args if arg != twice]
+                return math.prod(rest, start=self._square(twice))
         values = [self._value(arg, jets) for arg in expr.args]
         first = values[0]
         if op == "add":
@@ -253,7 +260,7 @@ class Evaluation:
             inside = expr.args[0] if expr.op == "neg" else self.section.meaning(expr.name)
             assert inside is not None
             return self._square(inside)
-        if expr.op == "mul" and not any(isinstance(self._value(arg, True), np.ndarray) for arg in expr.args):
+        if expr.op == "mul" and all(self.section.type_of(arg) is Type.SCALAR for arg in expr.args):
             squares = [self._square(arg) for arg in expr.args]
             return math.prod(squares[1:], start=squares[0])
         if expr.op == "frac":
@@ -268,10 +275,19 @@ class Evaluation:
                     return jet.chain(*self.numbers.squared_arccos(jet.value))
                 if expr.value == "sin" and part == 1:
                     return 1 - jet * jet
+                if expr.value == "sin" and part == Fraction(1, 2):
+                    return (1 - jet) / 2
                 if expr.value == "tan" and part == Fraction(1, 2):
                     return (1 - jet) / _nonzero(1 + jet)
-        value = self._value(expr, True)
-        return value * value
+        value = self._value(expr.args[0] if expr.op in ("norm", "sqrt") else expr, True)
+        if expr.op == "norm" and isinstance(value, np.ndarray):
+            return (value.T @ value)[0, 0]
+        return value if expr.op == "sqrt" else value * value
+
+    def _cosine_of(self, angle: Expr) -> Expr | None:
+        """The cosine of an angle that is an arc cosine."""
+        inner, part = self._angle_of(angle)
+        return inner.args[0] if inner is not None and part == 1 else None
 
     def _angle_of(self, expr: Expr) -> tuple[Expr | None, Fraction]:
         """The arc cosine of which a tree is a multiple, and the multiple."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -52,11 +52,14 @@ class Modules:
         Operation counts by energy and variant.
     notes
         A line for each variant that could not be made.
+    failed
+        A line for each energy of which something was not proved, so that it has no kernels.
     """
 
     texts: dict[str, str]
     operations: dict[str, dict[str, Any]]
     notes: list[str]
+    failed: list[str] = field(default_factory=list)
 
 
 def kernel_modules(
@@ -82,7 +85,8 @@ def kernel_modules(
     Raises
     ------
     InputError, NotRunError
-        If units do not come out as that of the energy; if a derived block or a declared invariance is not proved.
+        If units do not come out as that of the energy, or a declared invariance is not proved; if a derived block of an energy
+        of the package is not proved, while one of a user's leaves the others their kernels.
     """
     declarations = load_declarations(folder)
     energies = [energy for energy in declarations.energies if energy.document in (document, "")]
@@ -91,8 +95,15 @@ def kernel_modules(
     texts: dict[str, str] = {"series.py": series_module()} if package else {"__init__.py": _OWN_FOLDER}
     record: dict[str, Any] = {}
     missing: list[str] = []
+    failed: list[str] = []
     for energy in energies:
-        derived = proved(energy, declarations)
+        try:
+            derived = proved(energy, declarations)
+        except NotRunError as error:
+            if package:
+                raise
+            failed.append(f"{error}; it gets no kernels")
+            continue
         for variant in variants_of(energy):
             advance(f"{energy.name}, {variant}", len(planned))
             if variant == "printed":
@@ -118,7 +129,7 @@ def kernel_modules(
         texts[f"{energy.name}.py"] = _face(energy, default, package)
     for variant in dict.fromkeys(name.split("/")[0] for name in texts if "/" in name):
         texts[f"{variant}/__init__.py"] = f'"""Variant ``{variant}``: {SUMMARY[variant]}. Generated."""\n'
-    return Modules(dict(sorted(texts.items())), record, missing)
+    return Modules(dict(sorted(texts.items())), record, missing, failed)
 
 
 def variants_of(energy: Energy) -> tuple[str, ...]:

@@ -81,9 +81,9 @@ LIBRARY = {"arccos", "atan2", "cos", "exp", "expm1", "log", "log_ratio", "sin", 
 _FUNCTIONS = {
     "tape": LIBRARY | {"power", "select", "sqrt"},
  "geometry": {
-        "PI", "angle", "apart", "closing", "corner", "corner_exact", "deviation", "dot", "half_tangent", "in_order",
-        "normal_of", "right_corner", "right_corner_exact", "scaled", "segment", "segment_exact", "segment_twice", "total",
-        "total_twice", "turning", "versine",
+        "PI", "angle", "angle_over_sine", "angle_squared", "apart", "closing", "corner", "corner_exact", "deviation", "dot",
+        "half_tangent", "in_order", "normal_of", "right_corner", "right_corner_exact", "scaled", "segment",
+        "segment_exact", "segment_twice", "sine_excess", "total", "total_twice", "turning", "versine",
     },
 }  # fmt: skip
 

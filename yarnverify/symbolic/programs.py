@@ -22,11 +22,12 @@ from yarnverify.symbolic.safe import Safe
 from yarnverify.symbolic.safe_laws import safe_shapes
 from yarnverify.symbolic.safe_program import safe_program
 from yarnverify.symbolic.steps import Program
-from yarnverify.symbolic.sums import Stages, is_rational
+from yarnverify.symbolic.sums import Stages
 from yarnverify.symbolic.tree import FORCE, Expr
 from yarnverify.symbolic.vanishing import KEPT, kept_by_sums
 
 _SUMS = "no measures: of the terms of each sum a word more is computed than of itself, since a word may cancel"
+_BY_STEPS = "no law of lengths and one angle of segments: differentiated step by step, which promises no digits"
 
 
 @dataclass(frozen=True)
@@ -38,12 +39,17 @@ class Proved:
     derivation, shapes
         Of a law of measures: its derivation, and its safe shapes.
     stages
-        Of an energy that is rational in its coordinates.
+        Of an energy without safe shapes; proved where it is rational in its coordinates, by rules that are tested elsewhere.
     """
 
     derivation: Derivation | None = None
     shapes: tuple[Safe, ...] = ()
     stages: Stages | None = None
+
+    @property
+    def rational(self) -> Stages | None:
+        """The stages of an energy that is rational in its coordinates."""
+        return self.stages if self.stages is not None and self.stages.rational else None
 
 
 def proved(energy: Energy, declarations: Declarations) -> Proved:
@@ -65,37 +71,30 @@ def proved(energy: Energy, declarations: Declarations) -> Proved:
             )
     derivation = derive_declared(energy, declarations.quantities)
     if derivation is None:
-        section = declared_section(energy)
-        if not is_rational(energy, section):
-            return Proved()
-        stages = Stages(energy, section)
-        if wrong := stages.prove():
+        stages = Stages(energy, declared_section(energy))
+        if stages.rational and (wrong := stages.prove()):
             raise NotRunError(f"{energy.name}: derivatives by {', '.join(wrong)} are not those of the energy")
         return Proved(stages=stages)
-    _require_proofs(energy.name, derivation.check())
     shapes: tuple[Safe, ...] = ()
     with suppress(NoMeasuresError):
         shapes = tuple(safe_shapes(derivation))
+    if shapes or energy.document:
+        _require_proofs(energy.name, derivation.check())
     for shape in shapes:
         _require_proofs(f"{energy.name}, {shape.shape} shape", shape.check())
-    return Proved(derivation, shapes)
+    return Proved(derivation, shapes, None if shapes else Stages(energy, declared_section(energy)))
 
 
 def derived_programs(energy: Energy, found: Proved, variant: str) -> tuple[list[Program], list[str]]:
     """The programs of a derived variant, and notes on what is not as wished."""
-    if found.stages is not None and variant != "differentiated":
-        return [found.stages.program()], [_SUMS] if variant == "accurate" else []
-    if found.derivation is None:
-        note = "this energy is no law of known measures: plain differentiation, nothing is done for its singular states"
-        section = declared_section(energy)
-        return [plain_program(energy, section) if variant == "differentiated" else Stages(energy, section).program()], [
-            note
-        ]
     if variant == "differentiated":
+        if found.derivation is None:
+            return [plain_program(energy, declared_section(energy))], []
         return [derived_program(energy, found.derivation)], []
-    if not found.shapes:
-        note = "there is no safe form for this law; these are the differentiated formulas"
-        return [derived_program(energy, found.derivation)], [note]
+    if found.rational:
+        return [found.rational.program], [_SUMS] if variant == "accurate" else []
+    if found.stages:
+        return [found.stages.program], [_BY_STEPS]
     shapes = found.shapes
     if variant == "fast" and shapes[-1].shape == "polar":
         # within rounding of a fold the plain cross product has no direction any more: there, and only there, the exact one
@@ -181,15 +180,15 @@ def library_calls(programs: list[Program]) -> list[str]:
 
 def promise(variant: str, found: Proved, calls: set[str]) -> str:
     """What errors a kernel promises that calls some functions of a library; see ``runtime.Kernel``."""
-    if variant in ("differentiated", "printed") or not (found.shapes or found.stages):
+    if variant in ("differentiated", "printed") or not (found.shapes or found.rational):
         return "none"
     if calls:  # these carry on what their arguments lack, so more than a few units may be lost far from 0
         kept = calls <= KEPT and found.shapes and all(kept_by_sums(shape) for shape in found.shapes)
         return "condition" if kept else "none"
     if variant == "reference":
         return "units"
-    if found.stages:
-        return "units" if variant == "accurate" and found.stages.exact_terms() else "condition"
+    if found.rational:
+        return "units" if variant == "accurate" and found.rational.exact_terms() else "condition"
     less = any(_compares_angles(shape) or shape.has_pole for shape in found.shapes)
     return "units" if variant == "accurate" and found.shapes and not less else "condition"
 
@@ -198,7 +197,7 @@ def numbers(variant: str, found: Proved) -> str:
     """What numbers a kernel computes with; see ``runtime.Kernel``."""
     if variant == "reference":
         return "double-double"
-    return "words" if variant == "accurate" and found.stages else "float"
+    return "words" if variant == "accurate" and found.rational else "float"
 
 
 def _compares_angles(shape: Safe) -> bool:

@@ -109,6 +109,7 @@ class Sums:
 
     def safe(self, value: Any) -> Any:
         """An expression with every sum that may cancel replaced."""
+        value = value.replace(self._is_multiple, self._multiple)
         return value.replace(self._is_mixed, self._parted).replace(self._is_sum, self._call)
 
     def ordered(self, value: Any) -> Any:
@@ -118,6 +119,7 @@ class Sums:
     def apart(self, values: Iterable[Any]) -> Any:
         """What is positive where every sum with a length is more than rounding; None where there is no such sum."""
         every = {part for value in values for part in sp.sympify(value).atoms(sp.Add)}
+        every |= {part.primitive()[1] for part in every}
         sums = {part for part in (*every, *map(self._linear, every)) if self._is_sum(part)}
         found = {  # either sign of a sum
             -part if part.could_extract_minus_sign() else part
@@ -137,6 +139,14 @@ class Sums:
         atoms = {symbol for _, symbol in terms}
         known = all(abs(factor) == 1 and (symbol in self.inputs or symbol in self.lengths) for factor, symbol in terms)
         return known and (len(terms) > 2 or bool(atoms & set(self.lengths)))
+
+    def _is_multiple(self, value: Any) -> bool:
+        """Whether a sum is a multiple of one of these, as SymPy multiplies them out."""
+        return bool(value.is_Add and value.primitive()[0] != 1 and self._is_sum(value.primitive()[1]))
+
+    def _multiple(self, value: Any) -> Any:
+        factor, part = value.primitive()
+        return factor * self._call(part)
 
     def _is_mixed(self, value: Any) -> bool:
         """Whether a sum is one of these and of other terms, as where a difference is added to what is a multiple of it."""

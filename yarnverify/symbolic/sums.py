@@ -29,10 +29,13 @@ from yarnverify.symbolic.emit import (
     row_symbols,
     turn_checks,
 )
+from yarnverify.symbolic.laws import exponential
 from yarnverify.symbolic.measures import differentiate
 from yarnverify.symbolic.reading import Value
 from yarnverify.symbolic.steps import Program, settled
 from yarnverify.symbolic.tree import Expr
+from yarnverify.symbolic.vanishing import expm1, log_ratio, logarithm_of, sinh, sum_of
+from yarnverify.symbolic.vector_angles import Rule, VectorAngles
 
 _RATIONAL = {"number", "symbol", "add", "neg", "mul", "frac", "pow", "transpose", "dot", "cross"}
 
@@ -45,8 +48,8 @@ def is_rational(energy: Energy, section: Section) -> bool:
 _STEPS = {"add", "norm", "sqrt", "call", "cross"}
 
 
-class _Sums(Components):
-    """A reading in which every sum and every function is a named step.
+class Steps(Components):
+    """A reading in which every sum and every function is a named step; ``rules`` are derivatives that some steps have.
 
     Where the energy is rational, what is divided by stays outside of the steps: a sum is that of its terms over their common
     denominator, and so one of products, which an exact kernel can form without an error.
@@ -55,16 +58,56 @@ class _Sums(Components):
     def __init__(self, section: Section, rational: bool) -> None:
         super().__init__(section, {})
         self.rational = rational
+        self.rules: dict[sp.Symbol, Rule] = {}
+        self.angles = VectorAngles(self)
 
     def value(self, expr: Expr, blocks: Callable[[Expr], Value] | None = None) -> Value:
+        found = None if self.rational else self.angles.value(expr)
+        if found is not None:
+            return found
         found = super().value(expr, blocks)
         return self._steps_of(found) if expr.op in _STEPS else found
 
     def hold(self, value: Any) -> Any:
         if not self.rational:
-            return super().hold(value)
+            return super().hold(self._without_cancellation(value) if value.is_Add else value)
         over = sp.Mul.make_args(together(value))
-        return sp.Mul(*(super(_Sums, self).hold(factor) if factor.is_Add else factor for factor in over))
+        return sp.Mul(*(super(Steps, self).hold(factor) if factor.is_Add else factor for factor in over))
+
+    def log(self, value: Any) -> Any:
+        found = logarithm_of(self.steps.get(value, value))
+        if isinstance(found, log_ratio):
+            ratio, excess = found.args
+            found = super().hold(log_ratio(self.hold(ratio), self.hold(excess)))
+            self.rules[found] = lambda slope, row: slope(ratio, row) / ratio
+            return found
+        return super().log(value)
+
+    def _without_cancellation(self, total: Any) -> Any:
+        """A sum in which nothing cancels of exponentials and 1, nor of cosines and 1."""
+        powers = {
+            symbol: exponential(value.args[0]) for symbol, value in self.steps.items() if isinstance(value, sp.exp)
+        }
+        sums = {
+            symbol: value
+            for symbol, value in self.steps.items()
+            if value.is_Add and all(term.as_coeff_Mul()[1] in powers for term in value.args)
+        }
+        back = {power: symbol for symbol, power in powers.items()}
+        opened = total.xreplace(sums).xreplace(powers)
+        found = sum_of(opened)
+        if found == opened:
+            return self.angles.without_cancellation(total)
+        calls = {call: self._function(call) for call in sorted(found.atoms(expm1, sinh), key=str)}
+        return found.xreplace(calls).xreplace(back)
+
+    def _function(self, call: Any) -> Any:
+        """``expm1`` or ``sinh`` as a step."""
+        symbol, argument = super().hold(call), call.args[0]
+        other = 0 if isinstance(call, expm1) else sp.exp(-argument)
+        share = 1 if other == 0 else sp.Rational(1, 2)
+        self.rules[symbol] = lambda slope, row: share * (sp.exp(argument) + other) * slope(argument, row)
+        return symbol
 
     def absolute(self, value: Any) -> Any:
         return super().absolute(self.hold(value))  # a symbol is known to be real, and so its sign to have no slope
@@ -86,7 +129,7 @@ class Stages:
         self.rows = [symbol for name in energy.unknowns for symbol in row_symbols(name)]
         self.parameters = [symbol for p in energy.parameters for symbol in given_symbols(p.name)]
         self.rational = is_rational(energy, section)
-        self.reading = _Sums(section, self.rational)
+        self.reading = Steps(section, self.rational)
         self.value = self.reading.value(energy.expression)
         self._slopes: dict[tuple[Any, sp.Symbol], Any] = {}
         self.gradient = [self.slope(self.value, row) for row in self.rows]
@@ -119,19 +162,23 @@ class Stages:
         if key not in self._slopes:
             terms = [differentiate(value, row)]
             for symbol in sorted(value.free_symbols & set(self.steps), key=str):
-                inner = self.slope(self.steps[symbol], row)
+                rule = self.reading.rules.get(symbol)
+                inner = self.slope(self.steps[symbol], row) if rule is None else rule(self.slope, row)
                 if inner != 0:
                     terms.append(differentiate(value, symbol) * inner)
             found = sp.Add(*terms)
             self._slopes[key] = together(found) if self.rational else found
         return self._slopes[key]
 
+    @cached_property
     def program(self) -> Program:
         """The program of energy, gradient and Hessian."""
         section = self.reading.section
-        checks = list(length_checks(self.energy, section, self.reading, ", or so little that its square vanishes"))
+        more, but = ", or so little that its square vanishes", self.reading.angles.sines
+        checks = list(length_checks(self.energy, section, self.reading, more, but))
         checks += domain_checks(self.energy, self.reading)
         checks += turn_checks(self.energy, self.reading)
+        checks += self.reading.angles.checks()
         choice = active(self.energy, self.reading)
         return settled(self.steps, self.value, self.gradient, self.hessian, checks, choice)
 

@@ -53,10 +53,10 @@ def _gathered(value: Any) -> Any:
 
 
 def _rewritten(value: Any) -> Any:
-    return _sum(value) if value.is_Add else _logarithm(value.args[0])
+    return sum_of(value) if value.is_Add else logarithm_of(value.args[0])
 
 
-def _sum(value: Any) -> Any:
+def sum_of(value: Any) -> Any:
     """A sum of numbers times exponentials, and of others; rewritten where the numbers add up to 0."""
     shares = {term.as_coeff_Mul() for term in value.args if isinstance(term.as_coeff_Mul()[1], exponential)}
     constant = sum((term for term in value.args if term.is_Rational), sp.S.Zero)
@@ -71,7 +71,8 @@ def _sum(value: Any) -> Any:
     return rest + sp.Add(*(share * expm1(each.args[0]) for share, each in shares))
 
 
-def _logarithm(ratio: Any) -> Any:
+def logarithm_of(ratio: Any) -> Any:
+    """The logarithm of a quotient, by what it is apart from 1."""
     above, below = sp.fraction(sp.together(ratio))
     if ratio.is_number or (below.is_number and not above.is_Add):
         return sp.log(ratio)
