@@ -13,10 +13,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.io import loadmat, savemat
+from scipy.sparse import csc_matrix
 
 from yarnverify.check.command import Checked, check
 from yarnverify.check.factors import number_text
-from yarnverify.check.setting import Options, write_states
+from yarnverify.check.setting import Options, Setting, write_states
 from yarnverify.check.show import grouped, record
 from yarnverify.cli import app
 from yarnverify.errors import InputError, NotRunError
@@ -462,6 +464,7 @@ def test_a_library_without_that_function(library: str) -> None:
 _PROGRAM = """
 import json, sys
 import numpy as np
+from scipy.io import loadmat, savemat
 from yarnverify.kernels.accurate import stretch
 kind, source, sink = sys.argv[1:]
 if kind == "csv":
@@ -470,6 +473,9 @@ if kind == "csv":
 elif kind == "npz":
     found = np.load(source)
     q, k_s = found["q"], found["k_s"]
+elif kind == "mat":
+    found = loadmat(source)
+    q, k_s = found["q"], found["k_s"].ravel()
 else:
     found = json.load(open(source))
     q, k_s = np.array(found["q"]), np.array(found["k_s"])
@@ -478,21 +484,24 @@ if kind == "csv":
     np.savetxt(sink, np.column_stack([e, g.T]), delimiter=",", fmt="%.17g")
 elif kind == "npz":
     np.savez(sink, energy=e, force=-g.T)
+elif kind == "mat":
+    savemat(sink, {"E": e, "force": -g, "K": h, "key": found["key"], "work": np.array([1, "a", [2]], dtype=object)})
 else:
     text = [[x.hex() if x == x else None for x in row] for row in (-g.T).tolist()]
     json.dump({"key": found["key"], "energy": [None if x != x else x for x in e.tolist()], "force": text}, open(sink, "w"))
 """
 
 
-@pytest.mark.parametrize("kind", ["json", "npz", "csv"])
+@pytest.mark.parametrize("kind", ["json", "npz", "mat", "csv"])
 def test_a_command_that_reads_and_writes_files(tmp_path: Path, kind: str) -> None:
     program = tmp_path / "mine.py"
     program.write_text(_PROGRAM)
-    returns = ("energy", "force") if kind != "csv" else ()
+    returns = ("energy", "force") if kind in ("json", "npz") else ()
     options = Options(energy="stretch", count=4, returns=returns)
     found = check(None, options, command=f"{sys.executable} {program} {kind} {{in}} {{out}}", kind=kind)
     assert found.passes, said(found)
     assert [block.title for block, _ in found.found][:2] == ["energy", "gradient x0"]
+    assert len(found.found) == (21 if kind == "mat" else 5)
 
 
 @pytest.mark.parametrize(
@@ -517,7 +526,7 @@ def test_a_command_that_fails(tmp_path: Path, program: str, trouble: str) -> Non
         ("true {in}", "must hold {in} and {out}"),
         ("no-such-program-here {in} {out}", "there is no program no-such-program-here"),
         ("true {in} {out}", "wrote no file out.json"),
-        ("cp {in} {out}", "has none of energy, gradient, hessian; it has "),
+        ("cp {in} {out}", "has none of energy, gradient, hessian, force, jacobian; it has "),
     ],
 )
 def test_commands_that_cannot_be_run(command: str, text: str) -> None:
@@ -533,8 +542,13 @@ def test_inputs_are_written_and_outputs_read(tmp_path: Path) -> None:
     first = (tmp_path / "in.json").read_bytes()
     write_states(tmp_path / "in.json", options)
     assert (tmp_path / "in.json").read_bytes() == first
-    for name in ("in.npz", "in.csv"):
+    for name in ("in.npz", "in.csv", "in.mat"):
         write_states(tmp_path / name, options)
+    matlab, before = loadmat(tmp_path / "in.mat"), (tmp_path / "in.mat").read_bytes()
+    assert np.array_equal(matlab["q"], states["q"]) and matlab["key"][0] == states["key"]
+    assert [tag[0] for tag in matlab["tags"].ravel()] == states["tags"] and matlab["k_x"].shape == (len(states["q"]), 1)
+    write_states(tmp_path / "in.mat", options)
+    assert (tmp_path / "in.mat").read_bytes() == before
     stored = np.load(tmp_path / "in.npz")
     table = np.loadtxt(tmp_path / "in.csv", delimiter=",", skiprows=1)
     assert np.array_equal(stored["q"], np.array(states["q"])) and np.array_equal(table[:, :9], stored["q"])
@@ -546,12 +560,35 @@ def test_inputs_are_written_and_outputs_read(tmp_path: Path) -> None:
     assert check(None, options, outputs=tmp_path / "out.npz").passes
     np.savez(tmp_path / "out.npz", gradient=-g.T)
     assert check(None, options, outputs=tmp_path / "out.npz").hints == ["matches with --force"]
+    np.savez(tmp_path / "out.npz", gradient=g)  # the states last, as the package has them
+    assert check(None, options, outputs=tmp_path / "out.npz").passes
+
+
+def test_matlab_arrays_as_matlab_has_them(tmp_path: Path) -> None:
+    """States last, a cell for each, or sparse; forces by their name."""
+    from yarnverify.kernels.accurate import stretch
+
+    options, path = Options(energy="stretch", count=3, regimes=ONE), tmp_path / "out.mat"
+    q = Setting("stretch", options).cases.points
+    e, g, h = stretch.evaluate(q.q, **q.parameters)
+    cells = np.empty(len(e), dtype=object)
+    cells[:] = [csc_matrix(part) for part in np.moveaxis(-h, -1, 0)]
+    savemat(path, {"energy": csc_matrix(e[:, None]), "force": -g, "jacobian": cells})
+    found = check(None, options, outputs=path)
+    assert found.passes and len(found.found) == 21 and found.notes == ["taken as: energy, force, jacobian"]
 
 
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("out.txt", "", "the name must end in .json, .npz or .csv"),
+        ("out.txt", "", "the name must end in .json, .npz, .mat or .csv"),
+        ("out.mat", None, "cannot read: no such file"),
+        ("out.mat", "MATLAB", "is no MATLAB file: "),
+        (
+            "out.mat",
+            f"{'MATLAB 7.3 MAT-file':124}\0\2IM",
+            r"is a MATLAB 7.3 file; save it with -v7: save\('out.mat', ..., '-v7'\)",
+        ),
         ("out.json", None, "cannot read: no such file"),
         ("out.json", "{", "out.json:1:2: "),
         ("out.json", "[]", "holds no object"),
@@ -570,6 +607,26 @@ def test_bad_files(tmp_path: Path, name: str, text: str | None, message: str) ->
         (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=message):
         check(None, Options(energy="shear", count=2, regimes=ONE), outputs=tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"E_total": np.zeros(4)}, "has none of energy, gradient, hessian, force, jacobian; it has E_total$"),
+        ({"energy": np.zeros(5)}, r"energy has 5 numbers in shape \(5, 1\), not 1 for each of 2 states"),
+        ({"gradient": np.zeros((3, 6))}, r"gradient has the shape \(3, 6\); give the 2 states first, or last"),
+        ({"energy": {"a": 1.0}}, "energy is a struct; save its arrays themselves"),
+        ({"energy": np.array([1j, 2])}, "energy is not made of real numbers but of complex128"),
+        (
+            {"hessian": np.array([np.eye(9), np.eye(8)], dtype=object)},
+            "hessian is a cell array of matrices of different sizes",
+        ),
+    ],
+)
+def test_bad_arrays_of_matlab(tmp_path: Path, given: dict[str, Any], message: str) -> None:
+    savemat(tmp_path / "out.mat", given, oned_as="column")
+    with pytest.raises(InputError, match=message):
+        check(None, Options(energy="shear", count=2, regimes=ONE), outputs=tmp_path / "out.mat")
 
 
 # -- the command ------------------------------------------------------------------------------------------------------------

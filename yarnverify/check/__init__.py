@@ -4,7 +4,7 @@
     expressions.py  what an argument is in terms of this energy's: ``R = d/4``
     setting.py      what a person says about it, and the states and arguments that follow
     cases.py        the states, with their true results and condition numbers
-    exchange.py     states and results as JSON, NPZ or CSV
+    exchange.py     states and results as files; formats.py has their kinds: JSON, NPZ, MATLAB, CSV
     child.py        the other process: calls a Python function or a C function, state by state
     running.py      starts it; a crash or a hang is found, not suffered
     sources.py      where results come from: functions, a command line, a file

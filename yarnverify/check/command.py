@@ -79,7 +79,7 @@ def check(
     command, outputs
         Instead of a target: a command line with ``{in}`` and ``{out}``, or a file with results.
     kind
-        Of the files of a command: json, npz or csv.
+        Of the files of a command: json, npz, mat or csv.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def check(
     if target is not None:
         ran, convention, run_again = called(target, setting, options, q, values, notes, advance)
     else:
-        ran, convention = from_files(command, outputs, kind, setting, options, q, values)
+        ran, convention = from_files(command, outputs, kind, setting, options, q, values, notes)
     name = target or command or str(outputs)
     if convention is None:
         return Checked(

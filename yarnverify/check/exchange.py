@@ -1,19 +1,15 @@
-"""States and results as files, for code in any language: JSON, NPZ or CSV, by the name's ending.
+"""States and results as files, for code in any language: JSON, NPZ, MATLAB or CSV, by the name's ending.
 
-Inputs (JSON, NPZ): ``q``, one list a state in the order of ``rows``; each argument by its name, one value a state; ``tags``.
+Inputs: ``q``, one list a state in the order of ``rows``; each argument by its name, one value a state; ``tags``.
 CSV: a heading, then one line a state: its rows, then the arguments.
-Results (JSON, NPZ): one array for each output by its name, with one entry a state. CSV: one line a state, all outputs one after
-the other, with or without a heading. Numbers are written so that they are read back exactly; hexadecimal floats are read too.
+Results: one array for each output by its name, with one entry a state, the states first or last. CSV: one line a state, all
+outputs one after the other, with or without a heading. Numbers are written so that they are read back exactly; hexadecimal
+floats are read too.
 """
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
-import json
-import math
-import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,24 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.check.conventions import ALIASES, Convention, by_component
+from yarnverify.check.conventions import ALIASES, Convention
+from yarnverify.check.formats import States, format_of, numbers, read_csv
 from yarnverify.errors import InputError, NotRunError, why
 
 Array = NDArray[Any]
-KINDS = (".json", ".npz", ".csv")
-
-
-def kind_of(path: Path, option: str) -> str:
-    """The ending of a file, which says what it is.
-
-    Raises
-    ------
-    InputError
-        For another.
-    """
-    if path.suffix not in KINDS:
-        raise InputError(f"{option} {path}: the name must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}")
-    return path.suffix
 
 
 def key_of(q: Array, values: Mapping[str, Array]) -> str:
@@ -68,54 +51,12 @@ def write_inputs(
     InputError, NotRunError
         For another ending; where it cannot be written.
     """
-    kind = kind_of(path, "--write-inputs")
-    head = {"states_of": energy, "key": key_of(q, values), "rows": list(convention.labels), "arguments": list(values)}
+    kind = format_of(path, "--write-inputs")
+    states = States(energy, key_of(q, values), convention.labels, tuple(tags), q, values, convention.dtype)
     try:
-        if kind == ".npz":
-            arrays = {"q": q, **values}
-            rounded = {name: value.astype(convention.dtype) for name, value in arrays.items()}
-            write_npz(path, {**rounded, "tags": np.array(tags), "key": np.array(head["key"])})
-        elif kind == ".json":
-            record = {
-                **head,
-                "tags": list(tags),
-                **{name: value.tolist() for name, value in values.items()},
-                "q": q.tolist(),
-            }
-            path.write_text(_lines(record), encoding="utf-8")
-        else:
-            text = io.StringIO()
-            writer = csv.writer(text, lineterminator="\n")
-            columns = by_component(values, axis=1)
-            writer.writerow([*convention.labels, *columns])
-            writer.writerows(
-                [repr(float(x)) for x in (*row, *(column[at] for column in columns.values()))]
-                for at, row in enumerate(q)
-            )
-            path.write_text(text.getvalue(), encoding="utf-8")
+        path.write_bytes(kind.written(states))
     except OSError as error:
         raise NotRunError(f"{path}: cannot write: {why(error)}") from None
-
-
-def write_npz(path: Path, arrays: Mapping[str, Array]) -> None:
-    """Write arrays, the same bytes every time: without the time of day that an archive has otherwise."""
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, array in arrays.items():
-            text = io.BytesIO()
-            np.save(text, array)
-            archive.writestr(zipfile.ZipInfo(f"{name}.npy"), text.getvalue())
-
-
-def _lines(record: Mapping[str, Any]) -> str:
-    """JSON with one state a line."""
-    parts = []
-    for name, value in record.items():
-        if name in ("q", "tags"):
-            inner = ",\n  ".join(json.dumps(item) for item in value)
-            parts.append(f' "{name}": [\n  {inner}\n ]')
-        else:
-            parts.append(f" {json.dumps(name)}: {json.dumps(value)}")
-    return "{\n" + ",\n".join(parts) + "\n}\n"
 
 
 def read_results(
@@ -144,14 +85,14 @@ def read_results(
     InputError
         Where the file is not there, not of that kind, or not of that shape.
     """
-    kind = kind_of(path, "--outputs")
+    kind = format_of(path, "--outputs")
     try:
-        if kind == ".csv":
-            return _read_csv(path, returns, n)
-        found = _read_npz(path) if kind == ".npz" else _read_json(path)
+        if kind.read is None:
+            return read_csv(path, returns, n)
+        found = kind.read(path)
     except OSError as error:
         raise InputError(f"{path}: cannot read: {why(error)}") from None
-    given = str(found.pop("key", key))
+    given = str(np.ravel(found.pop("key", key))[0])
     if given != key:
         raise InputError(
             f"{path}: belongs to other states (key {given}, not {key}); write the inputs again, with the same options"
@@ -164,13 +105,8 @@ def read_results(
             if named:
                 raise InputError(f"{path}: has no {name}; it has {', '.join(found) or 'nothing'}")
             continue
-        value = _numbers(found[there], path, name)
-        if value.size != n * size:
-            raise InputError(
-                f"{path}: {name} has {value.size} numbers in shape {value.shape}, not {size} for each of {n} states"
-            )
         names.append(name)
-        parts.append(value.reshape(n, size))
+        parts.append(_by_state(numbers(found[there], path, name), n, size, f"{path}: {name}"))
     if not names:
         raise InputError(
             f"{path}: has none of {', '.join(name for name, _ in returns)}; it has {', '.join(found) or 'nothing'}"
@@ -178,79 +114,12 @@ def read_results(
     return names, np.hstack(parts)
 
 
-def _read_npz(path: Path) -> dict[str, Any]:
-    try:
-        with np.load(path) as stored:
-            return {name: stored[name] for name in stored.files}
-    except (ValueError, EOFError, KeyError) as error:
-        raise InputError(f"{path}: is no NPZ file: {error}") from None
-    except Exception as error:  # zipfile has its own
-        raise InputError(f"{path}: is no NPZ file: {type(error).__name__}") from None
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except json.JSONDecodeError as error:
-        raise InputError(error.msg, (str(path), error.lineno, error.colno)) from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: is no text") from None
-    if not isinstance(found, dict):
-        raise InputError(f"{path}: holds no object with an array for each output")
-    return found
-
-
-def _numbers(value: Any, path: Path, name: str) -> Array:
-    if isinstance(value, np.ndarray):
-        if value.dtype.kind not in "fiub":
-            raise InputError(f"{path}: {name} is not made of real numbers but of {value.dtype}")
-        return value.astype(np.float64)
-
-    def number(item: Any) -> Any:
-        if isinstance(item, list):
-            return [number(part) for part in item]
-        if item is None:
-            return math.nan
-        if isinstance(item, str):
-            return _read(item)
-        if isinstance(item, bool) or not isinstance(item, int | float):
-            raise ValueError(f"{item!r} is no number")
-        return float(item)
-
-    try:
-        return np.array(number(value), dtype=np.float64)
-    except (ValueError, OverflowError) as error:
-        raise InputError(f"{path}: {name}: {error}") from None
-
-
-def _read(text: str) -> float:
-    text = text.strip()
-    return float.fromhex(text) if "x" in text.lower() else float(text)
-
-
-def _read_csv(path: Path, returns: Sequence[tuple[str, int]], n: int) -> tuple[list[str], Array]:
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: is no text") from None
-    rows: list[list[float]] = []
-    for number, line in enumerate(lines, 1):
-        words = line.replace(",", " ").replace(";", " ").split()
-        if not words or words[0].startswith("#"):
-            continue
-        try:
-            rows.append([_read(word) for word in words])
-        except ValueError as error:
-            if not rows and number == 1:
-                continue  # a heading
-            raise InputError(str(error), (str(path), number, 1)) from None
-    if len(rows) != n:
-        raise InputError(f"{path}: has {len(rows)} lines of numbers, not {n}, one for each state")
-    total = sum(size for _, size in returns)
-    for number, row in enumerate(rows, 1):
-        if len(row) != total:
-            shown = ", ".join(f"{name} {size}" for name, size in returns)
-            raise InputError(
-                f"{path}: state {number} has {len(row)} numbers, not {total} ({shown}); say what there is with --returns"
-            )
-    return [name for name, _ in returns], np.array(rows, dtype=np.float64)
+def _by_state(value: Array, n: int, size: int, where: str) -> Array:
+    """(n, size) of an array with the states first, or last, or of one long row of numbers."""
+    if value.size != n * size:
+        raise InputError(f"{where} has {value.size} numbers in shape {value.shape}, not {size} for each of {n} states")
+    if value.ndim > 1 and value.shape[0] != n and value.shape[-1] == n:
+        value = np.moveaxis(value, -1, 0)
+    elif value.ndim > 1 and n not in (value.shape[0], value.shape[-1]) and 1 not in value.shape:
+        raise InputError(f"{where} has the shape {value.shape}; give the {n} states first, or last")
+    return value.reshape(n, size)

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from yarnverify.arrays import npz
 from yarnverify.check.child import BEGUN, DONE
-from yarnverify.check.exchange import write_npz
 from yarnverify.errors import InputError, NotRunError
 
 Array = NDArray[Any]
@@ -76,7 +76,7 @@ def run_target(
     """
     with tempfile.TemporaryDirectory(prefix="yarnverify-check-") as name:
         folder = Path(name)
-        write_npz(folder / "inputs.npz", {"q": q, **{f"v_{key}": value for key, value in values.items()}})
+        (folder / "inputs.npz").write_bytes(npz({"q": q, **{f"v_{key}": value for key, value in values.items()}}))
         status = np.lib.format.open_memmap(folder / "status.npy", mode="w+", dtype=np.uint8, shape=(len(q),))
         todo, troubles, ended = list(groups), {}, 0
         while todo and ended < MOST_ENDED:

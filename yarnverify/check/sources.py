@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import subprocess
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from yarnverify.check.conventions import Convention
-from yarnverify.check.exchange import key_of, kind_of, read_results, write_inputs
+from yarnverify.check.exchange import key_of, read_results, write_inputs
+from yarnverify.check.formats import format_of
 from yarnverify.check.running import Ran, ending, run_target
 from yarnverify.check.setting import Options, Setting
 from yarnverify.errors import InputError, NotRunError
@@ -129,16 +130,12 @@ def from_files(
     options: Options,
     q: Array,
     values: dict[str, Array],
+    notes: list[str],
 ) -> tuple[Ran, Convention | None]:
     given = {name: values[name] for name in setting.parameters}
-    key = key_of(q, given)
-    wanted = [(output.name, output.size) for output in setting.outputs(options.returns or WHOLE)]
-    n = len(setting.cases)
+    key, n = key_of(q, given), len(setting.cases)
     if outputs is not None:
-        if kind_of(outputs, "--outputs") == ".csv" and not options.returns:
-            wanted = _fitting(outputs, wanted)
-        names, flat = read_results(outputs, wanted, n, key, bool(options.returns))
-        return Ran(flat, np.ones(n, bool), {}), replace(setting.convention, outputs=setting.outputs(names))
+        return _results(outputs, setting, options, key, notes)
     assert command is not None
     if "{in}" not in command or "{out}" not in command:
         raise InputError("--command: must hold {in} and {out}, the files that it reads and writes")
@@ -161,9 +158,20 @@ def from_files(
             return Ran(np.zeros((n, 0)), np.zeros(n, bool), None, {0: text}), None
         if not sink.exists():
             raise InputError(f"--command: wrote no file {sink.name}")
-        if kind == "csv" and not options.returns:
-            wanted = _fitting(sink, wanted)
-        names, flat = read_results(sink, wanted, n, key, bool(options.returns))
+        return _results(sink, setting, options, key, notes)
+
+
+def _results(path: Path, setting: Setting, options: Options, key: str, notes: list[str]) -> tuple[Ran, Convention]:
+    """What a file holds: what a person says, or else all outputs that it has by name, or that fill a line of a CSV file."""
+    by_line = format_of(path, "--outputs").read is None
+    names: Sequence[str] = options.returns or (WHOLE if by_line else (*WHOLE, "force", "jacobian"))
+    wanted = [(output.name, output.size) for output in setting.outputs(names)]
+    if by_line and not options.returns:
+        wanted = _fitting(path, wanted)
+    n = len(setting.cases)
+    names, flat = read_results(path, wanted, n, key, bool(options.returns))
+    if not options.returns:
+        notes.append(f"taken as: {', '.join(names)}")
     return Ran(flat, np.ones(n, bool), {}), replace(setting.convention, outputs=setting.outputs(names))
 
 

@@ -51,8 +51,12 @@ def check(
         str | None,
         Parameter(help="Instead of a target, a command line: './mine {in} {out}'.", allow_leading_hyphen=True),
     ] = None,
-    files: Annotated[Literal["json", "npz", "csv"], Parameter(help="What the command reads and writes.")] = "json",
-    write_inputs: Annotated[Path | None, Parameter(help="Only write the states: a .json, .npz or .csv file.")] = None,
+    files: Annotated[
+        Literal["json", "npz", "mat", "csv"], Parameter(help="What the command reads and writes.")
+    ] = "json",
+    write_inputs: Annotated[
+        Path | None, Parameter(help="Only write the states: a .json, .npz, .mat or .csv file.")
+    ] = None,
     outputs: Annotated[Path | None, Parameter(help="Instead of a target, results for the states so written.")] = None,
     count: Annotated[int, Parameter(help="States of each regime.")] = 16,
     regime: Annotated[

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +11,7 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import NDArray
 
+from yarnverify import arrays as files
 from yarnverify.accuracy.rule import AMPLIFIED, EXACT
 from yarnverify.export.vectors import Vectors
 
@@ -24,7 +23,6 @@ _TEMPLATES = Environment(
     lstrip_blocks=True,
     keep_trailing_newline=True,
 )
-_MAT_TEXT = 116  # bytes of a MATLAB file that hold a text, with the time of day unless it is replaced
 
 
 def arrays(vectors: Vectors) -> dict[str, Array]:
@@ -44,29 +42,13 @@ def arrays(vectors: Vectors) -> dict[str, Array]:
 
 
 def npz(vectors: Vectors) -> bytes:
-    """For NumPy; without the time of day that an archive has otherwise."""
-    found = io.BytesIO()
-    with zipfile.ZipFile(found, "w") as archive:
-        for name, array in arrays(vectors).items():
-            text = io.BytesIO()
-            np.save(text, array)
-            archive.writestr(zipfile.ZipInfo(f"{name}.npy"), text.getvalue())
-    return found.getvalue()
+    """For NumPy."""
+    return files.npz(arrays(vectors))
 
 
 def mat(vectors: Vectors) -> bytes:
     """For MATLAB and Octave."""
-    from scipy.io import savemat
-
-    found = io.BytesIO()
-    texts = {"rows", "parameters", "blocks", "tags"}
-    named = {
-        name: np.array(value.tolist(), dtype=object) if name in texts else value
-        for name, value in arrays(vectors).items()
-    }
-    savemat(found, named, oned_as="column")
-    head = f"MATLAB 5.0 MAT-file: golden vectors of {vectors.energy}".encode().ljust(_MAT_TEXT)
-    return head + found.getvalue()[_MAT_TEXT:]
+    return files.mat(arrays(vectors), f"golden vectors of {vectors.energy}")
 
 
 def hexadecimal(value: float) -> str:
