@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.pages import drawn, whole_page
+from tests.pages import drawn, records, whole_page
 
 api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed (extra: browser)")
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed (extra: browser)")
@@ -176,4 +176,24 @@ def test_readable_without_scripts_and_on_paper(browser: Any, file: Path) -> None
     paper = page.pdf(prefer_css_page_size=True)
     assert paper.startswith(b"%PDF")
     assert 8 <= paper.count(b"/Type /Page\n") + paper.count(b"/Type /Page ") <= 50  # derivations are seven of them
+    context.close()
+
+
+@pytest.mark.parametrize("paper", ["A4", "Letter"])
+def test_nothing_is_cut_off_on_paper(browser: Any, tmp_path: Path, paper: str) -> None:
+    """Laid out as wide as the paper is within its margins, no table, picture or formula reaches beyond."""
+    wide = round(({"A4": 210, "Letter": 216}[paper] - 2 * 14) / 25.4 * 96)
+    path = tmp_path / "report.html"
+    path.write_text(whole_page(records()), encoding="utf-8")
+    context = browser.new_context(viewport={"width": wide, "height": 1000}, offline=True)
+    page = context.new_page()
+    page.emulate_media(media="print")
+    page.goto(path.as_uri())
+    cut = page.evaluate(
+        """() => [...document.querySelectorAll('table, svg.plot, math, p, dl, pre')].filter(each =>
+             each.getClientRects().length && each.getBoundingClientRect().right > innerWidth + 1).map(each =>
+             each.tagName + ' ' + each.textContent.trim().slice(0, 60))"""
+    )
+    assert cut == []
+    assert page.locator(".contents").is_hidden()
     context.close()

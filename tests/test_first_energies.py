@@ -9,9 +9,10 @@ import mpmath
 import numpy as np
 import pytest
 
-from yarnverify.accuracy.cells import kernel
+from yarnverify.accuracy.cells import Unit, kernel, run_unit
 from yarnverify.errors import InputError
 from yarnverify.generation import generate_kernels
+from yarnverify.kernels.inputs import ElementError
 from yarnverify.library import Shelf
 from yarnverify.project import project
 from yarnverify.source import Source
@@ -42,6 +43,22 @@ ENERGIES = """
 def hertz(x0: Point, x1: Point, *, E: Positive["Pa"], R: Positive["m"]):
     delta = 2 * R - length(x1 - x0)
     return 8 * E * sqrt(R / 2) * sqrt(delta) ** 5 / 15
+
+
+@energy
+def thick(x0: Point, x1: Point, *, k: Positive["N m^-1"], R: Positive["m"]):
+    return PI * k * (length(x1 - x0) - 3 * R / 2) ** 2
+
+
+@energy
+def lennard_jones(x0: Point, x1: Point, *, epsilon: Positive["J"], sigma: Positive["m"]):
+    ratio = sigma / length(x1 - x0)
+    return 4 * epsilon * (ratio**12 - ratio**6)
+
+
+@energy(domain=lambda x0, x1, L: length(x1 - x0) > L, elsewhere="zero")
+def tether(x0: Point, x1: Point, *, k: Positive["N m^-1"], L: Positive["m"]):
+    return k * (length(x1 - x0) - L) ** 2 / 2
 
 
 @energy
@@ -86,15 +103,28 @@ def yielding(q: Any, Y: Any, L: Any, e_0: Any) -> Any:
 
 LAWS: dict[str, Any] = {
     "hertz": lambda q, E, R: 8 * E * mpmath.sqrt(R / 2) * mpmath.sqrt(2 * R - l(q[3:], q[:3])) ** 5 / 15,
+    "thick": lambda q, k, R: mpmath.pi * k * (l(q[3:], q[:3]) - 3 * R / 2) ** 2,
+    "lennard_jones": lambda q, epsilon, sigma: (
+        4 * epsilon * ((sigma / (r := l(q[3:], q[:3]))) ** 12 - (sigma / r) ** 6)
+    ),
     "yielding": yielding,
     "smoothed": lambda q, k, h: k * (mpmath.sqrt(l(q[3:], q[:3]) ** 2 + h**2) - h),
     "drag": lambda q, w, c: c * l(q, w) ** 3 / 3,
     "tethers": lambda q, a, k, L: k * ((l(q[:3], a) - L) ** 2 + (l(q[3:], q[:3]) - L) ** 2) / 2,
 }
+
+
+def skew(size: float) -> list[float]:
+    return [0.6 * size, 0.48 * size, 0.64 * size]
+
+
 TWO = [0.25, -0.5, 1.0]
 STATES: list[tuple[str, list[float], dict[str, Any]]] = [
     ("hertz", [0, 0, 0, 0.25, 0.5, 0.25], {"E": 3.0, "R": 0.75}),
     ("hertz", [0, 0, 0, 1, 0, 0], {"E": 3.0, "R": 0.5 + 2**-30}),
+    ("hertz", [0, 0, 0, *skew(1 - 2.0**-30)], {"E": 3.0, "R": 0.5}),
+    ("thick", [0, 0, 0, *skew(1.05 + 1e-9)], {"k": 3.0, "R": 0.7}),
+    ("lennard_jones", [0, 0, 0, *skew(3e-10)], {"epsilon": 1.65e-21, "sigma": 3.4e-10}),
     *(("yielding", [0, 0, 0, 1 + e, 0, 0], {"Y": 2.0, "L": 1.0, "e_0": 0.001}) for e in (0, 1e-12, 1e-6, -1e-3, 0.5)),
     *(("smoothed", [*TWO, 0.25 + d, -0.5, 1.0 - d], {"k": 2.0, "h": 1.0}) for d in (2.0**-30, 2.0**-10, 1.0)),
     ("drag", [1.0, 2.0, 3.5], {"w": TWO, "c": 0.5}),
@@ -128,6 +158,38 @@ def test_values_slopes_and_bends_are_those_of_long_differences(
         for mine, true in zip(found, ([at()], slopes, [part for row in bends for part in row]), strict=True):
             error = mpmath.norm([mpmath.mpf(float(a)) - b for a, b in zip(np.ravel(mine), true, strict=True)])
             assert error <= 16 * 2.0**-53 * mpmath.norm(true) + mpmath.mpf(10) ** -35
+
+
+@pytest.mark.parametrize("name", ["hertz", "thick", "lennard_jones", "yielding"])
+@pytest.mark.parametrize("regime", ["moderate", "scales"])
+def test_hard_cases_cost_no_more_than_is_promised(folder: Path, name: str, regime: str) -> None:
+    """Roots of numbers and pi in twice the digits; multiples of lengths in sums; high powers of large and small lengths."""
+    variants = ("fast", "accurate", "reference")
+    for cell in run_unit(Unit(name, "float64", regime, variants, 16, 4, False, str(folder)))["cells"]:
+        for output in cell["outputs"].values():
+            assert output["worst"] is None or float(output["of_target"]) <= 1, cell
+
+
+def test_powers_that_cancel_promise_what_their_condition_allows(folder: Path) -> None:
+    promises = {name: kernel("accurate", name, folder).KERNEL.promise for name in ("hertz", "thick", "lennard_jones")}
+    assert promises == {"hertz": "units", "thick": "units", "lennard_jones": "condition"}
+
+
+def test_powers_fit_in_single_precision(folder: Path) -> None:
+    """The 12th power of an atom's size does not; that of a ratio of sizes does."""
+    q, values = np.array([[0, 0, 0, 3.5e-10, 1e-10, 0]]).T, {"epsilon": 1.65e-21, "sigma": 3.4e-10}
+    lj = kernel("accurate", "lennard_jones", folder)
+    single, double = (lj.evaluate(q.astype(kind), **values) for kind in (np.float32, np.float64))
+    for a, b in zip(single, double, strict=True):
+        assert np.abs(a - b).max() <= 1e-5 * np.abs(b).max()
+
+
+def test_what_is_slack_may_have_no_length(folder: Path) -> None:
+    ends = np.array([[0.0, 0, 0, 0, 0, 0], [0, 0, 0, 2, 0, 0]]).T
+    energies, forces, _ = kernel("accurate", "tether", folder).evaluate(ends, k=2.0, L=1.0)
+    assert energies.tolist() == [0.0, 1.0] and forces[:, 0].tolist() == [0.0] * 6 and forces[3, 1] == 2.0
+    with pytest.raises(ElementError, match="element 0: the segment x0-x1 has length zero"):
+        kernel("accurate", "hertz", folder).energy(ends, E=1.0, R=2.0)
 
 
 def test_whatever_is_measured_from_a_given_place_or_speed_is_proved(folder: Path) -> None:

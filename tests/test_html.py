@@ -188,6 +188,13 @@ def test_a_sum_too_long_for_a_line_leaves_its_fraction() -> None:
     assert formula(r"\frac{\rho \left( " + one + r" + b \right)}{6}").count("<math") == 1
 
 
+def test_steps_with_long_formulas_have_the_whole_width_of_a_paper(text: str) -> None:
+    assert text.count('<div class="steps narrow">') == len(records()["derivations"])
+    found = copy.deepcopy(records())
+    found["derivations"]["stretch"]["steps"][1]["formulas"][0]["latex"] = r"a = \frac{1}{2" + " + b" * 25 + "}"
+    assert whole_page(found).count('<div class="steps">') == 1
+
+
 def test_a_derivation_that_failed_says_so() -> None:
     found = copy.deepcopy(records())
     found["derivations"]["bending"]["all_proved"] = False

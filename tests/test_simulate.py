@@ -155,6 +155,16 @@ def test_a_scene_in_a_file_comes_out_as_known(tmp_path: Path) -> None:
     assert found.missed == [] and found.result["lines"][0]["runs"][0]["answers"][0]["exact"] == pytest.approx(0.105)
 
 
+def test_a_scene_finds_what_lies_beside_it(tmp_path: Path) -> None:
+    """From whatever folder it is called: the kernels of an energy of one's own are in a folder beside the scene."""
+    (tmp_path / "beside").mkdir()
+    (tmp_path / "beside" / "lengths.py").write_text("LENGTH = 0.1\n", encoding="utf-8")
+    path = tmp_path / "importing.py"
+    path.write_text("from beside.lengths import LENGTH\n" + SCENE.replace("yarn(0.1", "yarn(LENGTH"), encoding="utf-8")
+    done = shell(str(path), "--size", "2")
+    assert done.returncode == 0, done.stderr
+
+
 # -- runs that are interrupted ----------------------------------------------------------------------------------------
 
 

@@ -40,7 +40,8 @@ CHUNK = 8192  # elements at a time, so that scratch memory stays in the cache
 _SHARED = 4 * CHUNK
 
 # Lengths, sines and parameters within these powers of two, and coordinates of at most this size that are zero or at least so
-# small, can neither overflow nor underflow in any product that occurs.
+# small, can neither overflow nor underflow in any product that occurs, of as many factors.
+MOST_FACTORS = 10
 _MODERATE = {np.dtype(np.float64): 2.0**100, np.dtype(np.float32): 2.0**14}
 _SMALL = {np.dtype(np.float64): 2.0**-200, np.dtype(np.float32): 2.0**-28}
 
@@ -82,7 +83,7 @@ class Batch:
         self.dof, self.n = self.rows.shape
         self.dtype = self.rows.dtype
         self.values = parameters_of(kernel, parameters, self.n, self.dtype)
-        self.limit, self.small = _MODERATE[self.dtype], _SMALL[self.dtype]
+        self.limit, self.small = _MODERATE[self.dtype] ** (MOST_FACTORS / kernel.factors), _SMALL[self.dtype]
         self.watch = self._extreme_values()
         self.grows = not kernel.portable and self._has_exponentials()
         self.threads, self.engine = threads, engine

@@ -136,6 +136,10 @@ class Pair:
     def pi() -> Pair:
         return Pair(*_PI)
 
+    @staticmethod
+    def root_of(whole: int) -> Pair:
+        return Pair(_REAL(whole))._sqrt()
+
 
 def evaluator(
     function: Callable[[Sequence[Any]], list[Any]],

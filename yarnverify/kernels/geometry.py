@@ -307,6 +307,11 @@ def pi_like(value: Any) -> Any:
     return value.pi() if hasattr(value, "pi") else PI
 
 
+def root_of(whole: int, value: Any) -> Any:
+    """The square root of a whole number to as many digits as ``value`` has."""
+    return value.root_of(whole) if hasattr(value, "root_of") else sqrt(whole)
+
+
 def _acute(opposite: Any, adjacent: Any) -> Any:
     """The angle from 0 to a right angle with this sine and cosine; the smaller of the two settles it."""
     small = opposite / sqrt(2 * (1 + adjacent))

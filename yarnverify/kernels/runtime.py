@@ -13,7 +13,7 @@ from typing import Any, Literal, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from yarnverify.kernels.batch import CHUNK, Batch, upper
+from yarnverify.kernels.batch import CHUNK, MOST_FACTORS, Batch, upper
 from yarnverify.kernels.inputs import Array, ElementError, Engine, Errors, Out, Values
 from yarnverify.kernels.tape import Tape, record
 from yarnverify.kernels.words import Number, number
@@ -81,6 +81,9 @@ class Kernel:
     numbers
         ``float``; ``words`` for sums whose terms have more digits than they themselves need; or ``double-double`` for
         arithmetic in pairs that is rounded once at the end.
+    factors
+        The largest number of lengths, coordinates and parameters in a product: the more there are, the smaller the sizes of
+        which a power might not fit.
     promise
         How large errors are, where the variant does not say it: a few ``units`` in the last place, no more than the
         ``condition`` of the state explains, or ``none`` for formulas that lose digits near singular states.
@@ -94,6 +97,7 @@ class Kernel:
     portable: bool = True
     numbers: Literal["float", "words", "double-double"] = "float"
     promise: Literal["units", "condition", "none"] = "units"
+    factors: int = MOST_FACTORS
     loops: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # compiled ones, as they are made
     _tapes: dict[Any, Tape] = field(default_factory=dict, compare=False, repr=False)
 

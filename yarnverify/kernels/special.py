@@ -56,7 +56,8 @@ class Special:
         size = self._elements.size
         margins, choice = self._by_shape(0, np.arange(size))
         other = ~(choice[0] > 0) if choice.size else np.zeros(size, bool)
-        self._refuse(0, margins, other, only="energy")  # derivatives are the other shape's affair
+        zero = other & (choice[0] <= 0) if choice.size and len(self._batch.kernel.shapes) == 1 else ~np.ones(size, bool)
+        self._refuse(0, margins, other & ~zero, only="energy")  # derivatives are the other shape's affair
         self._refuse(0, margins, ~other)
         other &= self._reasons == ""
         if other.any() and len(self._batch.kernel.shapes) == 1:

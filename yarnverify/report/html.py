@@ -15,7 +15,7 @@ from yarnverify.report.accuracy import VARIANTS, error_table, kinds, worst_state
 from yarnverify.report.analysis import analysis_tables, fabric_line
 from yarnverify.report.benchmark import tables, where
 from yarnverify.report.brief import brief
-from yarnverify.report.mathml import compared, formula
+from yarnverify.report.mathml import compared, formula, widest
 from yarnverify.report.pages import mistakes
 from yarnverify.report.proof import proof_of
 from yarnverify.report.scenes import scenes
@@ -26,6 +26,7 @@ from yarnverify.report.tally import anchor_of, counted
 
 _FOLDER = Path(__file__).parent
 _ORDER = ("refuted", "inconsistent", "undecided", "proved")
+_COLUMN = 48  # letters of a formula that half the width of a paper has room for
 _SIGN = {"proved": "✓", "refuted": "✗", "undecided": "?", "inconsistent": "!"}
 _PARTS = ("verdicts", "corrections", "equations", "derivations", "accuracy", "speed", "scenes", "analysis", "commands")
 
@@ -87,6 +88,7 @@ def page(
         refuted=list(dict.fromkeys(claim["equation"] for claim in found["claims"] if claim["verdict"] == "refuted")),
         columns=[each for each in found["tally"] if each in ("proved", "refuted") or found["tally"][each]],
         derived=derived,
+        narrow={name: _narrow(derivation) for name, derivation in derived.items()},
         proofs={name: proof_of(derivation) for name, derivation in derived.items()},
         sections=_sections(found),
         counted=counted(found, derived),
@@ -155,6 +157,11 @@ def _marked(claim: dict[str, Any]) -> dict[str, Any]:
         before = formula(claim["printed"])
         after = formula(claim["correction"]) if claim["correction"] else ""
     return {"printed": Markup(before), "corrected": Markup(after), "edit": claim["edit"]}
+
+
+def _narrow(derivation: dict[str, Any]) -> bool:
+    """Whether the steps of a derivation fit into two columns."""
+    return all(widest(formula["latex"]) <= _COLUMN for step in derivation["steps"][1:] for formula in step["formulas"])
 
 
 def _errors(record: dict[str, Any] | None, energy: str) -> list[Any]:

@@ -110,10 +110,29 @@ def _mark(left: Element, right: Element) -> None:
             _mark(one, other)
 
 
-def _written(root: Element) -> str:
+def widest(latex: str) -> int:
+    r"""How many letters stand side by side in the widest part of a formula that no line can break.
+
+    >>> widest(r"a = \frac{b + c}{2}")
+    4
+    """
+    return max(sum(map(_letters, nodes)) for nodes in _pieces(_tree(latex)))
+
+
+def _letters(node: Element) -> int:
+    if node.tag in ("mfrac", "mover", "munder"):
+        return max(map(_letters, node))
+    return sum(map(_letters, node)) if len(node) else len(node.text or "")
+
+
+def _pieces(root: Element) -> list[list[Element]]:
     pieces: list[list[Element]] = [[]]
     _cut(_breakable(list(root)), pieces)
-    return "<wbr>".join(_piece(nodes) for nodes in pieces if nodes)
+    return [nodes for nodes in pieces if nodes]
+
+
+def _written(root: Element) -> str:
+    return "<wbr>".join(map(_piece, _pieces(root)))
 
 
 def _piece(nodes: Sequence[Element]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import signal
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -45,12 +46,16 @@ def _from_file(path: Path) -> Scene:
     spec = importlib.util.spec_from_file_location(f"scene_{path.stem}", path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    beside = str(path.resolve().parent)
+    sys.path.insert(0, beside)  # kernels in a folder beside it are found, as where Python itself runs the file
     try:
         spec.loader.exec_module(module)
     except SyntaxError as error:
         raise InputError(error.msg, (str(path), error.lineno or 1, error.offset or 1)) from None
     except Exception as error:
         raise InputError(f"{type(error).__name__}: {error}", (str(path), _line(error, path), 1)) from None
+    finally:
+        sys.path.remove(beside)
     found = [
         value
         for value in vars(module).values()

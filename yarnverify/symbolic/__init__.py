@@ -24,9 +24,9 @@ In the order of work::
     derive, explain             gradients and Hessians in vector form, proved; the derivation step by step
     corner, safe, safe_laws,    the same blocks rearranged so that they have no 0/0, proved again
       vanishing, radicals,
-      safe_program
+      cancelling, safe_program
     steps, emit, sums,          reading 3: straight-line programs, also of energies without safe forms; their text,
-      vector_angles, printing,    which of them a variant consists of, and the modules that hold them
-      programs, modules
+      vector_angles, angle_trees, which of them a variant consists of, and the modules that hold them
+      printing, programs, modules
     c_functions, c_source       the same programs as C
 """

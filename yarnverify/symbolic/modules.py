@@ -18,6 +18,7 @@ from yarnverify.symbolic.programs import (
     Proved,
     derived_programs,
     library_calls,
+    most_factors,
     numbers,
     printed_program,
     promise,
@@ -200,6 +201,7 @@ def module_text(
         "portable": not LIBRARY & set(tape),
         "promise": promise(variant, found, LIBRARY & set(tape)),
         "numbers": numbers(variant, found),
+        "factors": most_factors(found),
         "public": (
             ("energy", "(n,)", "Energy of each element", energy.unit, "Array"),
             ("gradient", vector, "Gradient, the negative of the force", f"{energy.unit}/m", "Array"),

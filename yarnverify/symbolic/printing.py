@@ -26,7 +26,7 @@ TEMPLATES = Environment(
 class _Printer(NumPyPrinter):  # type: ignore[misc]
     """Scalar code whose every operation is one that ``kernels.tape`` records; integer powers are products."""
 
-    divides = False  # by 3 instead of multiplying by 1/3, which is not a double
+    divides = False  # by 3 instead of multiplying by 1/3, which is not a double, nor is the root of 3
 
     def _print_Mul(self, expr: Any) -> str:
         ratio, rest = expr.as_coeff_Mul()
@@ -38,7 +38,7 @@ class _Printer(NumPyPrinter):  # type: ignore[misc]
         base, exponent = expr.args
         text = self._print(base)
         if exponent == sp.Rational(1, 2):
-            return f"sqrt({text})"
+            return f"root_of({text}, q[0])" if self.divides and base.is_Integer else f"sqrt({text})"
         if exponent.is_Rational and exponent.q == 2:
             whole = abs(int(exponent - sp.sign(exponent) / 2))
             power = f"sqrt({text})*{self._print(base**whole)}" if whole else f"sqrt({text})"
@@ -52,7 +52,7 @@ class _Printer(NumPyPrinter):  # type: ignore[misc]
         return product if exponent > 0 else f"(1/{product})"
 
     def _print_Pi(self, expr: Any) -> str:
-        return "PI"
+        return "pi_like(q[0])" if self.divides else "PI"
 
     def _print_sign(self, expr: Any) -> str:
         return f"select({self._print(expr.args[0])}, 1.0, -1.0)"
@@ -82,8 +82,8 @@ _FUNCTIONS = {
     "tape": LIBRARY | {"power", "select", "sqrt"},
  "geometry": {
         "PI", "angle", "angle_over_sine", "angle_squared", "apart", "closing", "corner", "corner_exact", "deviation", "dot",
-        "half_tangent", "in_order", "normal_of", "right_corner", "right_corner_exact", "scaled", "segment",
-        "segment_exact", "segment_twice", "sine_excess", "total", "total_twice", "turning", "versine",
+        "half_tangent", "in_order", "normal_of", "pi_like", "right_corner", "right_corner_exact", "root_of", "scaled",
+        "segment", "segment_exact", "segment_twice", "sine_excess", "total", "total_twice", "turning", "versine",
     },
 }  # fmt: skip
 

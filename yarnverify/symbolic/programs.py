@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from yarnverify.errors import InputError, NotRunError
+from yarnverify.kernels.batch import MOST_FACTORS
+from yarnverify.symbolic.cancelling import cancels, reach
 from yarnverify.symbolic.court import Court, Finding, Verdict
 from yarnverify.symbolic.declare import Declarations, Energy
 from yarnverify.symbolic.derive import Derivation, declared_section, derive_declared
@@ -190,7 +192,14 @@ def promise(variant: str, found: Proved, calls: set[str]) -> str:
     if found.rational:
         return "units" if variant == "accurate" and found.rational.exact_terms() else "condition"
     less = any(_compares_angles(shape) or shape.has_pole for shape in found.shapes)
+    less |= any(shape.corner is None and cancels(shape) for shape in found.shapes)
     return "units" if variant == "accurate" and found.shapes and not less else "condition"
+
+
+def most_factors(found: Proved) -> int | None:
+    """The largest number of factors in a product of a law without angles, where it is more than kernels reckon with."""
+    most = max((reach(shape) for shape in found.shapes if shape.corner is None), default=0)
+    return most if most > MOST_FACTORS else None
 
 
 def numbers(variant: str, found: Proved) -> str:

@@ -28,6 +28,7 @@ Digits: TypeAlias = Literal["plain", "exact", "twice"]
 
 # How near to 1 the cosine between the edges may come; a yarn folded further has sines whose products may underflow.
 _SMOOTH_UP_TO = 1 - sp.Rational(1, 2**20)
+_LARGEST_FACTOR = 64  # of a term in a sum that is formed without loss
 _PLAIN_DOWN_TO = sp.Rational(1, 2**16)  # sine; a plain cross product keeps some 37 of 53 bits there
 
 
@@ -72,7 +73,12 @@ def safe_program(
             choice = _symbol(safe.corner.name("s")) - _PLAIN_DOWN_TO
     sums = Sums(energy, safe, reading, digits)
     if choice is not None:
-        choice = sums.safe(sp.sympify(choice))  # whether an energy acts is a jump: never a matter of rounding
+        plain = sp.sympify(choice)
+        choice = sums.safe(plain)  # whether an energy acts is a jump: never a matter of rounding
+        for s in segments if energy.elsewhere == "zero" else ():
+            size = _symbol(s.l.name)
+            if not _acts_at_zero(plain, size):
+                choice = choice.xreplace({low: sp.Function("select")(size, low, 0) for low in _low(s)})
     elif guarded and safe.corner is None:
         choice = sums.apart([*reading.steps.values(), value, *gradient, *hessian])
     ordered = sums.ordered if digits == "plain" else sums.safe
@@ -86,6 +92,20 @@ def safe_program(
 
 def _symbol(name: Name) -> sp.Symbol:
     return given_symbols(name)[0]
+
+
+def _acts_at_zero(choice: Any, length: sp.Symbol) -> bool:
+    """Whether an energy acts where a length is zero, which then is an error; its digits below the last are none there."""
+    there = choice.xreplace({length: sp.S.Zero})
+    return bool(there.xreplace({symbol: sp.Dummy(positive=True) for symbol in there.free_symbols}).is_positive)
+
+
+def _powers(factor: Any) -> list[Any]:
+    """Powers of two whose sum a factor is, by which a number is multiplied without an error; none for other factors."""
+    if not factor.is_Rational or factor.q & (factor.q - 1) or abs(factor.p) > _LARGEST_FACTOR:
+        return []
+    sign, size = sp.sign(factor), abs(factor.p)
+    return [sign * sp.Rational(1 << bit, factor.q) for bit in reversed(range(size.bit_length())) if size >> bit & 1]
 
 
 def _low(segment: Segment) -> tuple[sp.Symbol, sp.Symbol]:
@@ -137,7 +157,7 @@ class Sums:
             return False
         terms = [term.as_coeff_Mul() for term in value.args]
         atoms = {symbol for _, symbol in terms}
-        known = all(abs(factor) == 1 and (symbol in self.inputs or symbol in self.lengths) for factor, symbol in terms)
+        known = all(_powers(factor) and (symbol in self.inputs or symbol in self.lengths) for factor, symbol in terms)
         return known and (len(terms) > 2 or bool(atoms & set(self.lengths)))
 
     def _is_multiple(self, value: Any) -> bool:
@@ -155,7 +175,7 @@ class Sums:
     def _linear(self, value: Any) -> Any:
         known = self.inputs | set(self.lengths)
         return sp.Add(
-            *(term for term in value.args if abs(term.as_coeff_Mul()[0]) == 1 and term.as_coeff_Mul()[1] in known)
+            *(term for term in value.args if _powers(term.as_coeff_Mul()[0]) and term.as_coeff_Mul()[1] in known)
         )
 
     def _parted(self, value: Any) -> Any:
@@ -183,6 +203,9 @@ class Sums:
         terms = sorted(
             value.args, key=lambda term: (term.as_coeff_Mul()[1] not in self.lengths, str(term.as_coeff_Mul()[1]))
         )
+        terms = [
+            part * symbol for factor, symbol in (term.as_coeff_Mul() for term in terms) for part in _powers(factor)
+        ]
         measured = self._measured(value)
         kept = measured if self.digits != "plain" else []
         low = sum((factor * self.lengths[symbol][0] for symbol, factor in kept), sp.S.Zero)
