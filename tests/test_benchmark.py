@@ -26,7 +26,9 @@ from yarnverify.benchmark.ways import Way, empty_outputs, unified
 from yarnverify.errors import InputError
 from yarnverify.kernels import VARIANTS
 from yarnverify.report.benchmark import benchmark_table, tables
-from yarnverify.symbolic.declare import Energy
+from yarnverify.symbolic.declare import Energy, Point, Positive, cross
+from yarnverify.symbolic.declare import angle as angle_between
+from yarnverify.symbolic.declare import energy as energy_of
 
 ENERGIES = ("stretch", "bending", "shear", "parallel_contact")
 
@@ -125,6 +127,14 @@ def test_hard_states_are_as_hard_as_they_say(size: str, declared: dict[str, Ener
 
 def test_energies_without_an_angle_have_no_fold(declared: dict[str, Energy]) -> None:
     assert list(error_states(declared["stretch"])) == ["mixed", "1e-4 from rest", "1e-8 from rest"]
+
+
+def test_an_angle_between_triangles_is_not_folded_by_moving_a_point() -> None:
+    @energy_of()
+    def hinge(x0: Point, x1: Point, x2: Point, x3: Point, *, k: Positive["J"]) -> Any:
+        return k * angle_between(cross(x1 - x0, x2 - x0), cross(x3 - x0, x1 - x0)) ** 2
+
+    assert list(error_states(hinge)) == ["mixed", "1e-4 from rest", "1e-8 from rest"]
 
 
 # -- contestants ------------------------------------------------------------------------------------------------------

@@ -91,6 +91,23 @@ def test_time_colour_and_view_change_the_picture(opened: tuple[Any, list[str]]) 
     assert faults == []
 
 
+def test_keys_turn_move_and_zoom(opened: tuple[Any, list[str]]) -> None:
+    page, faults = opened
+    page.locator("#view").focus()
+    page.keyboard.press("0")
+    start = shot(page)
+    pictures = [start]
+    for key in ("ArrowRight", "ArrowUp", "Shift+ArrowLeft", "+"):
+        for _ in range(4):
+            page.keyboard.press(key)
+        pictures.append(shot(page))
+    for before, after in pairwise(pictures):
+        assert (np.abs(before - after).max(2) > 20).mean() > 0.01
+    page.keyboard.press("0")
+    assert (shot(page) == start).all()
+    assert "arrow keys" in page.locator("#view").get_attribute("aria-label") and faults == []
+
+
 def test_it_plays(opened: tuple[Any, list[str]]) -> None:
     page, faults = opened
     page.get_by_role("button", name="play").click()

@@ -145,7 +145,10 @@ def _angles(expr: Expr) -> Iterator[tuple[Expr, Expr]]:
 def _folded(
     energy: Energy, angle: tuple[Expr, Expr], start: Inputs, size: float, draw: np.random.Generator
 ) -> Inputs | None:
-    """States whose angle is ``size`` from pi, made by moving a point that the second vector has and the first has not."""
+    """States whose angle is ``size`` from pi, made by moving a point that the second vector has and the first has not.
+
+    None where there is no such point, or the second vector does not go with it, as a cross product does not.
+    """
     first, second = angle
     own = {node.name for node in first.walk() if node.op == "symbol"}
     points = (node.name for node in second.walk() if node.op == "symbol" and node.name.bold)
@@ -159,10 +162,16 @@ def _folded(
             break
         at += 3 if name.bold else 1
     a = vector_of(first, values_of(energy, list(q), start.parameters), FUNCTIONS)
-    q[at : at + 3] = 0
-    origin = vector_of(second, values_of(energy, list(q), start.parameters), FUNCTIONS)
-    q[at] = 1
-    sign = (vector_of(second, values_of(energy, list(q), start.parameters), FUNCTIONS) - origin)[0]
+    ends = []
+    for place in np.vstack([np.zeros(3), np.eye(3)]):
+        q[at : at + 3] = place[:, None]
+        ends.append(
+            np.broadcast_to(vector_of(second, values_of(energy, list(q), start.parameters), FUNCTIONS), a.shape)
+        )
+    origin, moved = ends[0], np.array(ends[1:]) - ends[0]
+    sign = np.sign(moved[0, 0, 0])
+    if not np.allclose(moved, sign * np.eye(3)[..., None]):
+        return None
     length = np.linalg.norm(a, axis=0)
     across = np.cross(a, draw.standard_normal(a.shape), axis=0)
     across *= length / np.linalg.norm(across, axis=0)

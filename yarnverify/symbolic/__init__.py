@@ -26,7 +26,7 @@ In the order of work::
       vanishing, radicals,
       cancelling, safe_program
     steps, emit, sums,          reading 3: straight-line programs, also of energies without safe forms; their text,
-      vector_angles, printing,    which of them a variant consists of, and the modules that hold them
-      programs, modules
+      vector_angles, angle_trees, which of them a variant consists of, and the modules that hold them
+      printing, programs, modules
     c_functions, c_source       the same programs as C
 """

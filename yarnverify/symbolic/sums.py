@@ -18,6 +18,7 @@ import sympy as sp
 from sympy.polys.fields import FracField
 
 from yarnverify.kernels.words import CHEAP
+from yarnverify.symbolic.angle_trees import VectorAngles
 from yarnverify.symbolic.declare import Energy
 from yarnverify.symbolic.document import Section
 from yarnverify.symbolic.emit import (
@@ -35,7 +36,7 @@ from yarnverify.symbolic.reading import Value
 from yarnverify.symbolic.steps import Program, settled
 from yarnverify.symbolic.tree import Expr
 from yarnverify.symbolic.vanishing import expm1, log_ratio, logarithm_of, sinh, sum_of
-from yarnverify.symbolic.vector_angles import Rule, VectorAngles
+from yarnverify.symbolic.vector_angles import Rule
 
 _RATIONAL = {"number", "symbol", "add", "neg", "mul", "frac", "pow", "transpose", "dot", "cross"}
 
