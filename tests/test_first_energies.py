@@ -307,3 +307,20 @@ def test_the_forces_of_a_hinge_are_proved_and_their_misprint_is_mended() -> None
     found = {claim["equation"]: claim for claim in record["claims"]}
     assert [found[n]["verdict"] for n in "456"] == ["proved", "refuted", "proved"]
     assert found["5"]["change"] == r"index: \mathbf{n}_1 should be \mathbf{n}_2"
+
+
+def test_kernels_of_an_older_energy_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place = tmp_path / "edited"
+    place.mkdir()
+    (place / "area.py").write_text(HEAD + AREA, encoding="utf-8")
+    generate_kernels(False, of=project(place))
+    monkeypatch.chdir(tmp_path)
+    run = caller(monkeypatch, capsys)
+    assert run("accuracy", "edited/area", "--executor", "serial")[0] == 0
+    (place / "area.py").write_text(HEAD + AREA.replace("k *", "2 * k *"), encoding="utf-8")
+    for command in (("accuracy", "edited/area", "--executor", "serial"), ("fuzz", "edited/area", "--time", "2")):
+        status, out, _ = run(*command)
+        assert status == 1 and "The kernels are not what the energies give by now" in out
+        assert out.count("yarnverify generate edited") == 1
