@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,11 @@ import mpmath
 import numpy as np
 import pytest
 
+from tests.commands import caller
+from tests.test_export import build, needs_compiler
 from yarnverify.accuracy.cells import Unit, kernel, run_unit
 from yarnverify.errors import InputError
+from yarnverify.export.command import export
 from yarnverify.generation import generate_kernels
 from yarnverify.kernels.inputs import ElementError
 from yarnverify.library import Shelf
@@ -192,6 +196,61 @@ def test_what_is_slack_may_have_no_length(folder: Path) -> None:
         kernel("accurate", "hertz", folder).energy(ends, E=1.0, R=2.0)
 
 
+@needs_compiler
+def test_the_c_source_knows_where_an_energy_is_slack(folder: Path, tmp_path: Path) -> None:
+    """Also without length, where the digits below the last of a length are none."""
+    lines = export("tether", tmp_path, folder, 6, False)
+    assert "promises no digits" not in lines[-1]
+    build(tmp_path, "tether_test.c", "tether.c", "-o", "tether_test")
+    assert subprocess.run([tmp_path / "tether_test"], capture_output=True).returncode == 0
+
+
+AREA = """
+
+@energy
+def area(x0: Point, x1: Point, x2: Point, *, k: Positive["N m^-1"]):
+    return k * length(cross(x1 - x0, x2 - x0))
+"""
+
+
+def test_c_source_that_promises_no_digits_says_so(tmp_path: Path) -> None:
+    (tmp_path / "areas").mkdir()
+    (tmp_path / "areas" / "area.py").write_text(HEAD + AREA, encoding="utf-8")
+    lines = export("area", tmp_path, tmp_path / "areas", 1, False)
+    assert "area.c is differentiated step by step, which promises no digits" in lines[-1]
+
+
+SLIDING = (
+    HEAD
+    + """
+
+@energy(unit="W")
+def sliding(v0: Velocity, v1: Velocity, *, n: {kind}, f: Positive["N"], e: Positive["m s^-1"]):
+    v = v1 - v0
+    return f * sqrt(square(v - dot(v, n) * n) + e**2)
+"""
+)
+CODE = """
+def sliding(v0, v1, n, f, e):
+    v = v1 - v0
+    across = v - (v @ n) * n
+    return -f * across / (across @ across + e * e) ** 0.5
+"""
+
+
+@pytest.mark.parametrize(("kind", "status"), [("Direction", 0), ('Vector["1"]', 1)])
+def test_code_that_takes_a_normal_for_one_is_tried_on_normals(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], kind: str, status: int
+) -> None:
+    """The slope of this energy has ``n n^T n n^T``, which code shortens to ``n n^T``: right where n has length 1."""
+    (tmp_path / f"contact{status}").mkdir()
+    (tmp_path / f"contact{status}" / "sliding.py").write_text(SLIDING.replace("{kind}", kind), encoding="utf-8")
+    (tmp_path / "mine.py").write_text(CODE, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    arguments = ("mine.py", "--energy", f"contact{status}/sliding", "--returns", "v1", "--force")
+    assert caller(monkeypatch, capsys)("check", *arguments)[0] == status
+
+
 def test_whatever_is_measured_from_a_given_place_or_speed_is_proved(folder: Path) -> None:
     """No translation gives the rows of a point then: what is given does not move with it."""
     for declared in load_declarations(folder).energies:
@@ -248,3 +307,20 @@ def test_the_forces_of_a_hinge_are_proved_and_their_misprint_is_mended() -> None
     found = {claim["equation"]: claim for claim in record["claims"]}
     assert [found[n]["verdict"] for n in "456"] == ["proved", "refuted", "proved"]
     assert found["5"]["change"] == r"index: \mathbf{n}_1 should be \mathbf{n}_2"
+
+
+def test_kernels_of_an_older_energy_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place = tmp_path / "edited"
+    place.mkdir()
+    (place / "area.py").write_text(HEAD + AREA, encoding="utf-8")
+    generate_kernels(False, of=project(place))
+    monkeypatch.chdir(tmp_path)
+    run = caller(monkeypatch, capsys)
+    assert run("accuracy", "edited/area", "--executor", "serial")[0] == 0
+    (place / "area.py").write_text(HEAD + AREA.replace("k *", "2 * k *"), encoding="utf-8")
+    for command in (("accuracy", "edited/area", "--executor", "serial"), ("fuzz", "edited/area", "--time", "2")):
+        status, out, _ = run(*command)
+        assert status == 1 and "The kernels are not what the energies give by now" in out
+        assert out.count("yarnverify generate edited") == 1

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from yarnverify.errors import InputError, NotRunError, why
 from yarnverify.files import as_seen
 from yarnverify.library import declared_files, known
 from yarnverify.project import Project, project
@@ -43,7 +44,6 @@ def settle_files(folder: Path, texts: dict[str, str], check: bool, stale: list[s
     again
         The command that writes them.
     """
-    from yarnverify.errors import NotRunError, why
 
     outcome = Outcome()
     for name, text in texts.items():
@@ -127,6 +127,16 @@ def generate_kernels(
     outcome.lines += made["notes"] + made["failed"]
     outcome.differs |= bool(made["failed"])
     return outcome
+
+
+def out_of_date(of: Project) -> list[str]:
+    """A line that says so where kernels of one's own are not what the energies give by now."""
+    try:
+        differs = of.own and generate_kernels(True, of=of).differs
+    except (InputError, NotRunError):
+        return []
+    now = of.here("yarnverify generate")
+    return [f"The kernels are not what the energies give by now; to make these: {now}"] if differs else []
 
 
 def _is_generated(path: Path) -> bool:

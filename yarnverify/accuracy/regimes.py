@@ -152,6 +152,8 @@ def _scalars(shape: Shape, draw: Draw, n: int, slide: Array | float = 1.0) -> di
         name = parameter.label
         if parameter.name.bold:
             found[name] = draw.uniform(-1, 1, (3, n))
+            if parameter.direction:
+                found[name] = found[name] / np.linalg.norm(found[name], axis=0)
             continue
         found[name] = draw.uniform(0.5, 2.0, n)
         if name in shape.lengths:

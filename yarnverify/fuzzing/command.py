@@ -65,6 +65,9 @@ def fuzz(
         if searches[-1].interrupted:
             break
     lines = [line for one in searches for line in _lines(one)]
+    from yarnverify.generation import out_of_date
+
+    lines += out_of_date(of)
     skipped = names[len(searches) :]
     if skipped:
         lines.append(f"interrupted; not run: {', '.join(skipped)}")

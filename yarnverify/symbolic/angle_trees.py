@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import sympy as sp
 
 from yarnverify.symbolic.steps import Check
 from yarnverify.symbolic.tree import PI, Expr
-from yarnverify.symbolic.vector_angles import VectorAngle
-
-if TYPE_CHECKING:
-    from yarnverify.symbolic.sums import Steps
+from yarnverify.symbolic.vector_angles import Stepwise, VectorAngle
 
 _TURNS = ("sin", "cos", "tan")
 
@@ -20,7 +17,7 @@ _TURNS = ("sin", "cos", "tan")
 class VectorAngles:
     """The angles of a reading's trees, each made once."""
 
-    def __init__(self, reading: Steps) -> None:
+    def __init__(self, reading: Stepwise) -> None:
         self._reading = reading
         self.found: dict[tuple[Expr, Expr, int], VectorAngle] = {}
         self.sines: set[Expr] = set()  # lengths of cross products in angles of two arguments, which may be zero

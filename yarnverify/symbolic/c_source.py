@@ -65,6 +65,9 @@ class _Printer(C99CodePrinter):  # type: ignore[misc]
             return f"{name}({self._print(expr.args[0])})"
         if name in ("sqrt", "acos", "sin", "cos", "tan", "Abs", "log", "exp"):
             return str(super()._print_Function(expr))
+        if name == "select":
+            condition, yes, no = map(self._print, expr.args)
+            return f"({condition} > 0 ? {yes} : {no})"
         c_name, _ = self.functions.named(name, ("s",) * len(expr.args))
         return f"{c_name}({', '.join(self._print(arg) for arg in expr.args)})"
 
@@ -155,8 +158,8 @@ def _live(lines: list[str], results: list[str]) -> list[str]:
     return kept[::-1]
 
 
-def c_texts(name: str, folder: Path) -> dict[str, str]:
-    """The C source and the header of an energy: file name to text.
+def c_texts(name: str, folder: Path) -> tuple[dict[str, str], bool]:
+    """The C source and the header of an energy, file name to text, and whether it keeps its digits near singular states.
 
     Parameters
     ----------
@@ -181,8 +184,9 @@ def c_texts(name: str, folder: Path) -> dict[str, str]:
             raise InputError(
                 f"{name}: {word!r} is a word of C, which can have no function or value of this name; rename it"
             )
-    programs, notes = derived_programs(energy, proved(energy, declarations), "accurate")
-    return _texts(energy, programs, notes)
+    found = proved(energy, declarations)
+    programs, notes = derived_programs(energy, found, "accurate")
+    return _texts(energy, programs, notes), bool(found.shapes or found.rational)
 
 
 def _texts(energy: Energy, programs: list[Program], notes: list[str]) -> dict[str, str]:

@@ -73,6 +73,7 @@ class Real:
     unit: str
     positive: bool = False
     vector: bool = False
+    direction: bool = False
 
     def __class_getitem__(cls, unit: str) -> Real:
         return cls(unit)
@@ -90,6 +91,14 @@ class Vector:
 
     def __class_getitem__(cls, unit: str) -> Real:
         return Real(unit, vector=True)
+
+
+class Direction:
+    """Annotation of a parameter that is a vector of length 1, such as a normal or a material axis.
+
+    It is a ``Vector["1"]`` in all but the states that ``check``, ``accuracy`` and ``export`` draw: there its length is 1 to
+    rounding, on which code relies that leaves it out of its formulas. A proof holds for any length.
+    """
 
 
 _OPTIONS = ("q", "errors", "out", "threads", "engine")  # arguments that every kernel has
@@ -122,7 +131,8 @@ def _unknowns(function: Callable[..., Any], hints: dict[str, Any]) -> dict[str, 
         if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
             _fail(function, key, f"*{key} stands for nothing; name every unknown and every parameter")
         if hints.get(key) not in _KINDS:
-            what = "a parameter goes behind the *" if isinstance(hints.get(key), Real) else "one of these is needed"
+            parameter_here = isinstance(hints.get(key), Real) or hints.get(key) is Direction
+            what = "a parameter goes behind the *" if parameter_here else "one of these is needed"
             _fail(
                 function,
                 key,
@@ -138,17 +148,19 @@ def _parameters(function: Callable[..., Any], hints: dict[str, Any]) -> dict[str
         if parameter.kind is not parameter.KEYWORD_ONLY:
             continue
         kind = hints.get(key)
+        if kind is Direction:
+            kind = Real("1", vector=True, direction=True)
         if not isinstance(kind, Real):
             what = "an unknown goes before the *" if kind in _KINDS else "a parameter has a unit, 1 for a plain number"
             _fail(
                 function,
                 key,
                 f"parameter {key!r} of {function.__name__} must be annotated "
-                f'Positive["unit"], Real["unit"] or Vector["unit"]; {what}',
+                f'Positive["unit"], Real["unit"], Vector["unit"] or Direction; {what}',
             )
         if not isinstance(kind.unit, str):
             _fail(function, key, f'the unit of {key!r} must be a text such as "N m^2", not {kind.unit!r}')
-        found[key] = Parameter(name_of(key, kind.vector), kind.unit, kind.positive)
+        found[key] = Parameter(name_of(key, kind.vector), kind.unit, kind.positive, kind.direction)
     return found
 
 
@@ -343,7 +355,7 @@ def unchanged_by(energy: Energy) -> Callable[[Callable[..., dict[str, Expr | int
 
 
 __all__ = [
-    "PI", "Assumption", "Declarations", "Energy", "Motion", "Parameter", "Point", "Positive", "Quantity", "Real",
+    "PI", "Assumption", "Declarations", "Direction", "Energy", "Motion", "Parameter", "Point", "Positive", "Quantity", "Real",
     "Sliding", "SlidingSpeed", "Vector", "Velocity", "angle", "arccos", "arcsin", "arctan", "assumptions", "atan2",
     "cos", "cross", "deviation", "dot", "energy", "exp", "length", "load_declarations", "log", "name_of", "quantity",
     "sin", "sqrt", "square", "tan", "unchanged_by", "unit",

@@ -17,6 +17,7 @@ class Parameter:
     name: Name
     unit: str
     positive: bool
+    direction: bool = False  # a vector of length 1
 
     @property
     def label(self) -> str:

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import sympy as sp
 
@@ -24,11 +24,20 @@ from yarnverify.symbolic.plain import plain
 from yarnverify.symbolic.steps import Check
 from yarnverify.symbolic.tree import Expr
 
-if TYPE_CHECKING:
-    from yarnverify.symbolic.sums import Steps
-
 Slope: TypeAlias = Callable[[Any, sp.Symbol], Any]  # of an expression by a row
 Rule: TypeAlias = Callable[[Slope, sp.Symbol], Any]  # the derivative of a step by a row
+
+
+class Stepwise(Protocol):
+    """A reading that makes steps of values; ``rules`` are the derivatives that some of them have."""
+
+    rules: dict[sp.Symbol, Rule]
+
+    def value(self, expr: Expr) -> Any:
+        """Value of a tree."""
+
+    def hold(self, value: Any) -> Any:
+        """The symbol of a value."""
 
 
 def _cross(a: list[Any], b: list[Any]) -> list[Any]:
@@ -52,7 +61,7 @@ class VectorAngle:
         Trees of the vectors.
     """
 
-    reading: Steps
+    reading: Stepwise
     a: Expr
     b: Expr
     sign: int = 1
