@@ -446,3 +446,43 @@ def stretch_stranger(q: Any, youngs: float) -> Any:
 
 def stretch_named_oddly(q: Any, k_s: float) -> Any:
     return {"pull": np.zeros(3)}
+
+
+# -- one slip in code that forms everything from parts ---------------------------------------------------------------------
+
+
+def bending_reads_exchanged(q: Any, k_b: Any) -> Any:
+    """The state with x0 and x2 in each other's place, and results as if it were not."""
+    return _of(bending, q[[6, 7, 8, 3, 4, 5, 0, 1, 2, 9, 10]], k_b=k_b)
+
+
+def bending_lengths_exchanged(q: Any, k_b: Any) -> Any:
+    """The other segment's length in the forces on the ends; that on the middle is minus their sum."""
+    _, g, _ = _of(bending, q, k_b=k_b)
+    lengths = [np.sqrt(((q[rows] - q[:3]) ** 2).sum(axis=0)) for rows in (slice(3, 6), slice(6, 9))]
+    with np.errstate(all="ignore"):
+        g[3:6] *= lengths[0] / lengths[1]
+        g[6:9] *= lengths[1] / lengths[0]
+    g[:3] = -g[3:6] - g[6:9]
+    return {"gradient": g}
+
+
+def bending_two_left_out(q: Any, k_b: Any) -> Any:
+    """The middle's own block without the two mixed ones."""
+    _, _, h = _of(bending, q, k_b=k_b)
+    h[:3, :3] -= h[3:6, 6:9] + h[6:9, 3:6]
+    return {"hessian": h}
+
+
+def bending_upper_triangle(q: Any, k_b: Any) -> Any:
+    return {"hessian": np.triu(np.moveaxis(_of(bending, q, k_b=k_b)[2], -1, 0)).transpose(1, 2, 0)}
+
+
+def bending_lower_triangle_doubled(q: Any, k_b: Any) -> Any:
+    h = np.moveaxis(_of(bending, q, k_b=k_b)[2], -1, 0)
+    return {"hessian": (np.tril(h) + np.tril(h, -1)).transpose(1, 2, 0)}
+
+
+def bending_sum_with_transpose(q: Any, k_b: Any) -> Any:
+    h = np.moveaxis(_of(bending, q, k_b=k_b)[2], -1, 0)
+    return {"hessian": (2 * h - h * np.eye(11)).transpose(1, 2, 0)}

@@ -128,6 +128,12 @@ def test_single_precision_is_held_to_its_own_unit() -> None:
         ("bending_supplement", "takes pi minus the angle for the angle: its cosine has the wrong sign"),
         ("bending_sum_left_out", "wrong: G[x0]: lacks minus x2: it is left out of a sum"),
         (
+            "bending_lengths_exchanged",
+            "wrong: G[x0]: is minus the sum of other blocks as they came: no mistake of its own",
+        ),
+        ("bending_two_left_out", "wrong: H[x0,x0]: lacks x1, x2 and x2, x1: they are left out of a sum"),
+        ("bending_reads_exchanged", "has x0 and x2 exchanged in what it reads, and not in what it gives"),
+        (
             "bending_of_curvature",
             "takes 2 tan(angle/2), as discrete elastic rods have it, for the angle, and takes the present length for the rest "
             "length that it is spread on",

@@ -195,6 +195,18 @@ def test_no_force_in_compression_besides_another_law() -> None:
     assert said("stretch", energy, regimes=("moderate", "near rest")) == {text}
 
 
+def _exchanged(energy: Law) -> Law:
+    """With x0 and x2 in each other's place."""
+    return lambda q, p: energy(np.concatenate([q[6:9], q[3:6], q[:3], q[9:]]), p)
+
+
+def test_unknowns_in_each_others_place() -> None:
+    right = _bending(lambda a, r, *_: a**2 / r)
+    assert said("bending", _exchanged(right)) == {"has x0 and x2 exchanged"}
+    turned = _bending(lambda a, r, *_: -(a**2) / r)
+    assert "has the wrong sign, as with u1 and u2 exchanged" in said("bending", turned, outputs="E")
+
+
 def test_what_follows_from_a_wrong_energy_is_no_mistake_of_its_own() -> None:
     energy = _shear(lambda a, dot, first, L: first / L * (a - np.pi / 2) ** 2 / 2)
     assert said("shear", energy) == {"lacks a factor L/|x1 - x0|", "follows from the energy as it came"}

@@ -11,6 +11,7 @@
     judge.py        each block: pass or fail, by one rule
     recognise.py    what is wrong: another formula (``formula.py``, ``factors.py``), or lost digits (``digits.py``)
     laws.py         other laws that people take for an energy's own, in one table; measures.py finds their place in its formula
+    siblings.py     what a block is in terms of the others: transposed, swapped, a sum
     hints.py        other conventions under which it would be right
     show.py         the tables; command.py puts all of it together
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from yarnverify.accuracy.regimes import vector_parameters
 from yarnverify.check.cases import Cases
 from yarnverify.check.conventions import Convention, Results, decoded
-from yarnverify.check.hints import argument_hint, factor_hints, order_hint, sign_hints, stray_hints
+from yarnverify.check.hints import argument_hint, factor_hints, order_hint, sign_hints, stray_hints, triangle_hints
 from yarnverify.check.judge import Block, judged, narrowed
 from yarnverify.check.recognise import Diagnosis, Judge
 from yarnverify.check.running import Ran
@@ -127,6 +127,7 @@ def _judged(
             block = block if plainest.passes else plainest
         found.append((block, diagnosis))
         advance("judging", len(cases) + len(blocks))
+    found = judge.sums(found)
     checked = Checked(name, cases, convention, found, notes=notes, extra={k: v for k, v in results.extra.items() if v})
     checked.left = ran.left
     checked.troubles = _troubles(ran, cases)
@@ -138,7 +139,8 @@ def _judged(
 
         checked.hints = sign_hints(found, convention, fails) + factor_hints(found, cases)
         unknown = any(
-            (diagnosis.status == "wrong" and not diagnosis.reasons) or diagnosis.status == "no value"
+            (diagnosis.status == "wrong" and (not diagnosis.reasons or diagnosis.reasons[0].endswith("exchanged")))
+            or diagnosis.status == "no value"
             for _, diagnosis in found
         )
         nothing = not any(diagnosis.status != "wrong" and block.judged.any() for block, diagnosis in found)
@@ -146,6 +148,7 @@ def _judged(
             checked.hints = argument_hint(convention, cases, again, said)
         if again is not None and unknown and not checked.hints:
             checked.hints = order_hint(convention, cases, again)
+        checked.hints += triangle_hints(results, convention, cases, judge.plain & ran.done)
         checked.hints += stray_hints(found, results.stray)
     return checked
 

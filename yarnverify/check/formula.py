@@ -16,6 +16,7 @@ from yarnverify.check.cases import Cases, angles
 from yarnverify.check.factors import Factor, curvatures, factor, number_text, quantities, ratio, terms
 from yarnverify.check.judge import Block
 from yarnverify.check.laws import Laws
+from yarnverify.check.siblings import Siblings
 from yarnverify.symbolic.declare import Energy
 
 Array = NDArray[Any]
@@ -60,7 +61,7 @@ class Formula:
     ) -> None:
         self.cases, self.blocks, self._printed, self.plain = cases, blocks, printed, plain
         self.tolerance = 1e-3 if cases.dtype == "float32" else 1e-6
-        self.angle = angles(cases)
+        self.angle, self.siblings = angles(cases), Siblings(cases.energy, blocks, self._same)
         self._quantities: dict[str, Array] | None = None
         self._others_known: dict[tuple[str, float], dict[tuple[str, str], Array]] = {}
 
@@ -104,6 +105,8 @@ class Formula:
         where = np.flatnonzero(at)[live]
         found = ratio(computed[:, live], true[:, live], self.tolerance)
         known = self._factor(found, where)
+        if known is not None and known.is_sign and block.kind == "E" and (text := self.laws.exchanged):
+            return Mistake(text, known, -1)
         if known is not None:
             return Mistake(_factor_text(known), known, 1 if known.number > 0 else -1)
         for sign in (1, -1):
@@ -115,9 +118,7 @@ class Formula:
             if printed is not None:
                 return printed
             for test in (
-                self._transposed,
-                self._summand,
-                self._other_block,
+                self.siblings.explained,
                 self._parameter,
                 self._first_derivatives,
                 self.definite,
@@ -156,33 +157,6 @@ class Formula:
         sign = 1 if np.array_equal(computed, block.computed[:, at]) else -1
         text = f"is what the document prints, misprint included{equation_of(self.cases.energy, block.name)}{size}"
         return _signed(text, sign)
-
-    def _transposed(self, block: Block, computed: Array, at: Array) -> str:
-        if block.kind != "H" or block.computed.shape[0] != 9:
-            return ""
-        turned = block.true.reshape(3, 3, -1).swapaxes(0, 1).reshape(9, -1)
-        return "is transposed" if self._same(computed, turned[:, at]) else ""
-
-    def _others(self, block: Block) -> list[Block]:
-        return [
-            b for b in self.blocks if b.kind == block.kind and b.name != block.name and b.true.shape == block.true.shape
-        ]
-
-    def _summand(self, block: Block, computed: Array, at: Array) -> str:
-        """The blocks of a row add up to zero where a translation changes nothing: a sum from which one was left out."""
-        rest = computed - block.true[:, at]
-        for other in self._others(block):
-            if self._same(rest, other.true[:, at]):
-                return f"lacks minus {_spelled(other.name)}: it is left out of a sum"
-            if self._same(rest, -2 * other.true[:, at]) or self._same(rest, 2 * other.true[:, at]):
-                return f"holds {_spelled(other.name)} with the wrong sign"
-        return ""
-
-    def _other_block(self, block: Block, computed: Array, at: Array) -> str:
-        for other in self._others(block):
-            if self._same(computed, other.true[:, at]):
-                return f"is the block {_spelled(other.name)}: indices are swapped"
-        return ""
 
     def _parameter(self, block: Block, computed: Array, at: Array) -> str:
         """A length, such as a distance of contact, that is a multiple of what it should be."""
@@ -278,10 +252,6 @@ class Formula:
 
 def _signed(text: str, sign: int) -> Mistake:
     return Mistake(text if sign > 0 else f"{text}, and has the wrong sign", None, sign)
-
-
-def _spelled(name: str) -> str:
-    return name.replace(",", ", ")
 
 
 def _factor_text(found: Factor) -> str:

@@ -16,6 +16,7 @@ from yarnverify.check.conventions import Convention, Results, Row, decoded
 from yarnverify.check.factors import number_text
 from yarnverify.check.judge import Block
 from yarnverify.check.recognise import Diagnosis
+from yarnverify.check.siblings import triangle
 from yarnverify.check.sources import Again
 
 Array = NDArray[Any]
@@ -144,6 +145,16 @@ def argument_hint(convention: Convention, cases: Cases, again: Again, said: Mapp
             better = "matches" if signs == _signs(results, cases, at) else "more is right"
             return [f"{better} with the arguments in another order: {words}{_flags(signs, convention)}"]
     return []
+
+
+def triangle_hints(results: Results, convention: Convention, cases: Cases, plain: Array) -> list[str]:
+    """What was done to the whole Hessian, in the order in which the implementation has it."""
+    rows = [row.index for row in convention.rows if row.index is not None]
+    if not results.given["H"].all() or len(rows) != cases.dof:
+        return []
+    mine = np.ix_(rows, rows)
+    text = triangle(results.hessian[mine][..., plain], cases.truth.hessian[mine][..., plain], 1e-4)
+    return [text] if text else []
 
 
 def stray_hints(found: Found, stray: Mapping[str, Array]) -> list[str]:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, partial
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from yarnverify.check.judge import Block
 from yarnverify.check.measures import expressions, replaced, total_length
 from yarnverify.symbolic.declare import Energy
 from yarnverify.symbolic.formulas import dot, length, log, sin, sqrt, tan
-from yarnverify.symbolic.tree import PI, Expr, as_expr
+from yarnverify.symbolic.tree import PI, Expr, Name, as_expr, rebuild
 
 Array = NDArray[Any]
 Values = dict[tuple[str, str], Array]
@@ -109,6 +110,21 @@ def alternatives(energy: Energy) -> Iterator[tuple[str, Expr]]:
     return (way for way in ways if way[0])
 
 
+def exchanges(energy: Energy) -> list[tuple[tuple[str, str], Expr]]:
+    """An energy with two unknowns of a kind in each other's place."""
+    found = []
+    for a, b in combinations(energy.unknowns, 2):
+        if a.bold == b.bold:
+            other = {a: b, b: a}
+
+            def change(node: Expr, other: dict[Name, Name] = other) -> Expr | None:
+                new = other.get(node.name) if node.op == "symbol" else None
+                return None if new is None else Expr("symbol", value=new)
+
+            found.append(((a.label, b.label), rebuild(energy.expression, change)))
+    return found
+
+
 @dataclass(frozen=True)
 class Explained:
     """By which law a block is right, and its sign."""
@@ -147,6 +163,16 @@ class Laws:
         """(n,) bool: where a block is zero and the yarn shorter than at rest, as people have it who want no compression."""
         shorter = self.cases.shorter
         return np.zeros(len(self.cases), bool) if shorter is None else block.judged & shorter & ~source.any(axis=0)
+
+    @cached_property
+    def exchanged(self) -> str:
+        """Which two unknowns give the energy the other sign if they change places, in words."""
+        points = self.cases.points.take(self.plain)
+        for names, expression in exchanges(self.cases.energy):
+            known = truth(replace(self.cases.energy, expression=expression, domain=()), points).energy
+            if np.array_equal(known, -self.cases.truth.energy[self.plain]):
+                return f"has the wrong sign, as with {' and '.join(names)} exchanged"
+        return ""
 
     def follow(self, factor: Factor) -> None:
         """Say that the energy that came is the true one times a factor: what follows from it is no mistake of its own."""
@@ -217,11 +243,24 @@ class Laws:
             for place, factor in found.items()
         }
 
+    def _tried(self) -> Iterator[tuple[str, Values]]:
+        """Other laws, and other places of the unknowns: in all, or in what is read and not in what is given."""
+        for text, expression in alternatives(self.cases.energy):
+            yield text, self._values(expression)
+        for (a, b), expression in exchanges(self.cases.energy):
+            values, other = self._values(expression), {a: b, b: a}
+            yield f"has {a} and {b} exchanged", values
+            places = {(kind, name): (kind, ",".join(other.get(x, x) for x in name.split(","))) for kind, name in values}
+            given = {place: values[source] for place, source in places.items() if source in values}
+            same = all(np.array_equal(values[b.kind, b.name], b.true[:, self.plain]) for b in self.blocks)
+            if len(given) == len(values) and not same:  # an energy that is the same then has but its blocks swapped
+                yield f"has {a} and {b} exchanged in what it reads, and not in what it gives", given
+
     @cached_property
     def _table(self) -> dict[tuple[str, str], Explained]:
         best: dict[tuple[str, str], Explained] = {}
-        for text, expression in alternatives(self.cases.energy):
-            found = self._explained(text, self._values(expression))
+        for text, values in self._tried():
+            found = self._explained(text, values)
             best = found if len(found) > len(best) else best
         return best
 

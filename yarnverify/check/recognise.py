@@ -6,7 +6,7 @@ right, and loses digits, or has no value, where something is small.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -99,3 +99,24 @@ class Judge:
                 return Diagnosis("wrong", (text,), None, 1)
             reasons.append(self.digits.loss(block, lost))
         return Diagnosis("loses digits" if lost.any() else "no value", tuple(reasons), None, 1)
+
+    def sums(self, found: list[tuple[Block, Diagnosis]]) -> list[tuple[Block, Diagnosis]]:
+        """What was found, with the blocks that are sums of mistaken ones, of which nothing else is known."""
+        known = {(block.kind, block.name): diagnosis for block, diagnosis in found}
+        left = [block for block, diagnosis in found if diagnosis.status == "wrong" and not diagnosis.reasons]
+        while True:
+            block = next((block for block in left if self._follows(block, known)), None)
+            if block is None:
+                return [(block, known[block.kind, block.name]) for block, _ in found]
+            text = "is minus the sum of other blocks as they came: no mistake of its own"
+            known[block.kind, block.name] = Diagnosis("wrong", (text,))
+            left.remove(block)
+
+    def _follows(self, block: Block, known: Mapping[tuple[str, str], Diagnosis]) -> bool:
+        """Whether a block is minus the sum of others, of which some are wrong, and it is known how."""
+        at = self.plain & block.judged & np.isfinite(block.computed).all(axis=0)
+        for row in self.formula.siblings.summed(block, at):
+            wrong = [known[block.kind, name] for name in row if known[block.kind, name].status == "wrong"]
+            if wrong and all(other.reasons for other in wrong):
+                return True
+        return False
