@@ -176,7 +176,7 @@ def test_every_step_of_every_derivation_is_shown(text: str) -> None:
     derived = records()["derivations"]
     assert list(parts) == list(derived)
     for name, derivation in derived.items():
-        assert parts[name].count('<div class="formula">') == sum(len(step["formulas"]) for step in derivation["steps"])
+        assert parts[name].count('<div class="formula"') == sum(len(step["formulas"]) for step in derivation["steps"])
         assert re.findall("<h4>([^<]+)", parts[name]) == [step["title"] for step in derivation["steps"][1:]]
         assert "ot all proved" not in parts[name]
 
@@ -323,6 +323,23 @@ def test_marks_of_the_document_show_the_edit() -> None:
         if claim["verdict"] != "proved":
             left, right = compared(claim["printed"], claim["correction"])
             assert (marked(left, "was"), marked(right, "now")) == wanted[claim["equation"]]
+
+
+@pytest.mark.parametrize("latex", [r"a \|b - c\|", r"a \|b - c\|^2 d", r"|b - c|", r"\|b - c\| + \|d\|_2 - \|b - c\|"])
+def test_bars_are_brackets(latex: str) -> None:
+    shown = formula(latex)
+    trees = [fromstring(piece) for piece in shown.split("<wbr>")]
+    bars = [node for tree in trees for node in tree.iter("mo") if node.text in ("‖", "|", "∥")]
+    assert [bar.get("form") for bar in bars] == ["prefix", "postfix"] * (len(bars) // 2) and bars
+    assert all(bar.get("fence") == "true" for bar in bars)
+    assert all("".join(tree.itertext()).count("b") == "".join(tree.itertext()).count("c") for tree in trees)
+
+
+def test_long_formulas_can_be_scrolled_by_keys() -> None:
+    found = copy.deepcopy(records())
+    claim = next(claim for claim in found["verdicts"]["claims"] if claim["equation"] == "9")
+    claim["printed"] = r"a = \frac{1}{2" + " + b" * 25 + "}"
+    assert whole_page(found).count('tabindex="0" role="group"') == whole_page().count('tabindex="0" role="group"') + 1
 
 
 def test_formulas_break_at_their_terms() -> None:

@@ -135,6 +135,24 @@ def test_names_cover_no_spot_no_line_and_no_other_name() -> None:
         assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
 
 
+def test_no_leader_runs_through_another_name() -> None:
+    """Two spots at the edge, one above the other, shut in by lines and by spots beside them: the best front of shear."""
+    fronts = {"fast compiled": (37.0, 30.0), "accurate compiled": (37.0, 18.0)}
+    spots = fronts | {"fast": (58.0, 30.0), "accurate": (68.0, 18.0), "numba": (52.0, 39.0)}
+    lines = [((37.0, 30.0), (37.0, 150.0)), ((37.0, 18.0), (250.0, 18.0))]
+    found = places(fronts, spots, lines, (0.0, 0.0, 260.0, 160.0))
+    (one, _), (other, _) = found.values()
+    assert any(led for _, led in found.values())
+    for (name, (shift, led)), (beside, there) in (
+        (("fast compiled", found["fast compiled"]), ("accurate compiled", other)),
+        (("accurate compiled", found["accurate compiled"]), ("fast compiled", one)),
+    ):
+        x, y, wide = spots[beside][0] + there[0], spots[beside][1] + there[1], LETTER * len(beside) / 2
+        for k in range(101):
+            a, b = (spots[name][axis] + k / 100 * shift[axis] for axis in (0, 1))
+            assert not led or not (abs(a - x) < wide and abs(b - y) < HIGH / 2)
+
+
 def test_the_right_angle_is_shown_where_the_condition_grows() -> None:
     record = {"curves": [curve("0"), curve("right angle"), curve("pi")]}
     figure = error_against_angle(record, "bending")

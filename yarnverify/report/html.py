@@ -26,6 +26,8 @@ from yarnverify.report.tally import anchor_of, counted
 
 _FOLDER = Path(__file__).parent
 _ORDER = ("refuted", "inconsistent", "undecided", "proved")
+_PHONE = 18  # letters of a formula that a telephone has room for
+_SCROLLS = Markup(' tabindex="0" role="group" aria-label="A long formula"')
 _COLUMN = 48  # letters of a formula that half the width of a paper has room for
 _SIGN = {"proved": "✓", "refuted": "✗", "undecided": "?", "inconsistent": "!"}
 _PARTS = ("verdicts", "corrections", "equations", "derivations", "accuracy", "speed", "scenes", "analysis", "commands")
@@ -67,6 +69,7 @@ def page(
         lstrip_blocks=True,
         autoescape=True,
     )
+    templates.filters["scrolls"] = lambda latex: _SCROLLS if widest(latex) > _PHONE else ""
     templates.filters["math"] = lambda latex: Markup(formula(latex))
     templates.filters["powers"] = _powers
     templates.filters["capitalize_first"] = lambda text: text[:1].upper() + text[1:]
@@ -156,7 +159,7 @@ def _marked(claim: dict[str, Any]) -> dict[str, Any]:
     else:
         before = formula(claim["printed"])
         after = formula(claim["correction"]) if claim["correction"] else ""
-    return {"printed": Markup(before), "corrected": Markup(after), "edit": claim["edit"]}
+    return {"printed": Markup(before), "corrected": Markup(after), "edit": claim["edit"], "claim": claim}
 
 
 def _narrow(derivation: dict[str, Any]) -> bool:

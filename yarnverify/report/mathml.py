@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import deepcopy
 from difflib import SequenceMatcher
+from functools import cache
 from xml.etree.ElementTree import Element, fromstring, tostring
 
 from latex2mathml.converter import convert
@@ -16,6 +17,7 @@ from latex2mathml.converter import convert
 _NAMESPACE = ' xmlns="http://www.w3.org/1998/Math/MathML"'
 _RELATIONS = frozenset("=<>≤≥≠≈")
 _SIGNS = frozenset("+\N{MINUS SIGN}")
+_BARS = frozenset("\N{DOUBLE VERTICAL LINE}\N{PARALLEL TO}|")
 _UPRIGHT = frozenset("ΓΔΘΛΞΠΣΥΦΨΩ")
 _WIDE = 9  # leaves; shorter brackets stay in one piece
 _LINE = 60  # leaves; longer sums fill more than a line of paper
@@ -54,6 +56,7 @@ def _tidy(node: Element) -> None:
     if node.tag == "math" and len(node) == 1 and node[0].tag == "mrow" and not _fenced(node[0]):
         node[:] = list(node[0])
     if node.tag in _ROWS:
+        node[:] = _normed(list(node))
         for place, child in reversed(list(enumerate(node))):
             if _is_function(child):
                 node.insert(place + 1, Element("mspace", {"width": "0.17em"}))
@@ -66,6 +69,30 @@ def _tidy(node: Element) -> None:
             bracket.set("stretchy", "false")  # stretched ones stand further off
     if node.tag == "mi" and (node.text or "") in _UPRIGHT:
         node.set("mathvariant", "normal")
+
+
+def _normed(nodes: list[Element]) -> list[Element]:
+    """Bars in pairs, as the brackets that they are: not two operators with room around them, between which a line breaks."""
+    found: list[Element] = []
+    opened: int | None = None
+    for node in nodes:
+        bar = node[0] if node.tag in ("msup", "msub", "msubsup") else node
+        found.append(node)
+        if bar.tag != "mo" or bar.text not in _BARS or bar.get("fence") == "true":
+            continue
+        if opened is None:
+            if bar is node:
+                opened = len(found) - 1
+            continue
+        row = Element("mrow")
+        for side, form in ((found[opened], "prefix"), (bar, "postfix")):
+            side.attrib |= {"stretchy": "false", "fence": "true", "form": form}
+        row.extend([*found[opened:-1], bar])
+        if bar is not node:
+            node[0] = row
+        found[opened:] = [row if bar is node else node]
+        opened = None
+    return found
 
 
 def _opens(node: Element) -> bool:
@@ -110,6 +137,7 @@ def _mark(left: Element, right: Element) -> None:
             _mark(one, other)
 
 
+@cache
 def widest(latex: str) -> int:
     r"""How many letters stand side by side in the widest part of a formula that no line can break.
 

@@ -12,7 +12,16 @@ LETTER, HIGH = 5.4, 8.0  # the width of a bold letter and the height of a name, 
 _SPOT = 4.5  # half the size of a spot
 _LED = 9.0  # a name farther away than this from its spot has a leader
 # what a place costs beside its distance: whatever hides something counts most
-_ON_NAME, _ON_SPOT, _THROUGH_SPOT, _ON_LINE, _NEARER = 500.0, 300.0, 60.0, 40.0, 60.0
+_ON_NAME, _ON_SPOT, _THROUGH_NAME, _THROUGH_SPOT, _CROSSING, _ON_LINE, _NEARER = (
+    500.0,
+    300.0,
+    150.0,
+    60.0,
+    60.0,
+    40.0,
+    60.0,
+)
+_ROUNDS = 5
 
 
 def places(
@@ -31,30 +40,68 @@ def places(
     frame
         What names stay within.
     """
-    found: dict[str, tuple[Point, bool]] = {}
-    taken: list[Box] = []
-    for name in named:
-        spot, wide = spots[name], LETTER * len(name)
-        others = [spots[other] for other in spots if other != name]
+    named, found = list(named), dict[str, Point]()
+    for _ in range(_ROUNDS):  # the first have the first choice; then each moves to where it is best among the others
+        before = dict(found)
+        for name in named:
+            taken = {other: shift for other, shift in found.items() if other != name}
+            found[name] = min(_shifts(_width(name)), key=lambda shift: _cost(name, shift, spots, lines, frame, taken))
+        if found == before:
+            break
+    return {name: (shift, _led(name, spots[name], shift)) for name, shift in found.items()}
 
-        def cost(shift: Point, spot: Point = spot, wide: float = wide, others: list[Point] = others) -> float:
-            box = _box(spot, shift, wide)
-            gap = _gap(spot, box)
-            total = gap + 0.02 * abs(shift[0]) + _ON_NAME * sum(_overlap(box, other) for other in taken)
-            total += _ON_SPOT * sum(_overlap(box, _around(other)) for other in (spot, *others))
-            total += _ON_LINE * sum(_overlap(box, _along(*ends)) for ends in lines)
-            total += _NEARER * any(_gap(other, box) < gap for other in others)
-            if gap > _LED:
-                end = spot[0] + shift[0], spot[1] + shift[1]
-                total += _THROUGH_SPOT * sum(_meets(spot, end, _around(other)) for other in others)
-            outside = max(frame[0] - box[0], frame[1] - box[1], box[2] - frame[2], box[3] - frame[3])
-            return total + (1e6 + outside if outside > 0 else 0.0)
 
-        shift = min(_shifts(wide), key=cost)
-        box = _box(spot, shift, wide)
-        taken.append(box)
-        found[name] = shift, _gap(spot, box) > _LED
-    return found
+def _cost(
+    name: str,
+    shift: Point,
+    spots: Mapping[str, Point],
+    lines: Sequence[tuple[Point, Point]],
+    frame: Box,
+    taken: Mapping[str, Point],
+) -> float:
+    """How bad a place is, with other names where they are."""
+    spot, others = spots[name], [spots[other] for other in spots if other != name]
+    box = _box(spot, shift, _width(name))
+    outside = max(frame[0] - box[0], frame[1] - box[1], box[2] - frame[2], box[3] - frame[3])
+    if outside > 0:
+        return 1e6 + outside
+    gap, end = _gap(spot, box), _end(spot, shift)
+    total = gap + 0.02 * abs(shift[0])
+    total += _ON_SPOT * sum(_overlap(box, _around(other)) for other in (spot, *others))
+    total += _ON_LINE * sum(_overlap(box, _along(*ends)) for ends in lines)
+    total += _NEARER * any(_gap(other, box) < gap for other in others)
+    led = gap > _LED
+    if led:
+        total += _THROUGH_SPOT * sum(_meets(spot, end, _around(other)) for other in others)
+    for other, there in taken.items():
+        place, from_there = _box(spots[other], there, _width(other)), _end(spots[other], there)
+        total += _ON_NAME * _overlap(box, place)
+        total += _THROUGH_NAME * (led and _meets(spot, end, place))
+        if _led(other, spots[other], there):
+            total += _THROUGH_NAME * _meets(spots[other], from_there, box)
+            total += _CROSSING * (led and _cross(spot, end, spots[other], from_there))
+    return total
+
+
+def _width(name: str) -> float:
+    return LETTER * len(name)
+
+
+def _end(spot: Point, shift: Point) -> Point:
+    return spot[0] + shift[0], spot[1] + shift[1]
+
+
+def _led(name: str, spot: Point, shift: Point) -> bool:
+    return _gap(spot, _box(spot, shift, _width(name))) > _LED
+
+
+def _cross(a: Point, b: Point, c: Point, d: Point) -> bool:
+    """Whether two lines between points cross."""
+
+    def left(p: Point, q: Point, r: Point) -> bool:
+        return (q[0] - p[0]) * (r[1] - p[1]) > (q[1] - p[1]) * (r[0] - p[0])
+
+    return left(a, b, c) != left(a, b, d) and left(c, d, a) != left(c, d, b)
 
 
 def _shifts(wide: float) -> list[Point]:
