@@ -72,6 +72,12 @@ def yielding(x0: Point, x1: Point, *, Y: Positive["N"], L: Positive["m"], e_0: P
 
 
 @energy
+def two_roots(x0: Point, x1: Point, *, k: Positive["N"], L: Positive["m"], d: Positive["1"]):
+    e = length(x1 - x0) / L - 1
+    return k * L * (d**2 * (sqrt(1 + (e / d) ** 2) - 1) + sqrt(1 + e**2) - 1)
+
+
+@energy
 def smoothed(x0: Point, x1: Point, *, k: Positive["N"], h: Positive["m"]):
     return k * (sqrt(length(x1 - x0) ** 2 + h**2) - h)
 
@@ -164,8 +170,8 @@ def test_values_slopes_and_bends_are_those_of_long_differences(
             assert error <= 16 * 2.0**-53 * mpmath.norm(true) + mpmath.mpf(10) ** -35
 
 
-@pytest.mark.parametrize("name", ["hertz", "thick", "lennard_jones", "yielding"])
-@pytest.mark.parametrize("regime", ["moderate", "scales"])
+@pytest.mark.parametrize("name", ["hertz", "thick", "lennard_jones", "yielding", "two_roots"])
+@pytest.mark.parametrize("regime", ["moderate", "ratios", "scales"])
 def test_hard_cases_cost_no_more_than_is_promised(folder: Path, name: str, regime: str) -> None:
     """Roots of numbers and pi in twice the digits; multiples of lengths in sums; high powers of large and small lengths."""
     variants = ("fast", "accurate", "reference")

@@ -206,6 +206,9 @@ def _made_up_for(shape: Shape) -> dict[str, int]:
     return dict.fromkeys([*shape.others][:1], 1) if shape.only_angles else dict(shape.others)
 
 
+_SMALLEST_RATIO = 1e-4  # of a parameter without a unit
+
+
 # -- regimes ----------------------------------------------------------------------------------------------------------
 
 
@@ -253,7 +256,11 @@ def _ratios(shape: Shape, limits: Limits, draw: Draw, n: int) -> dict[str, Array
         )
     else:
         slide = np.where(which, ratio, 1 / ratio)
-    return placed(shape, draw, n, half=_mixed_half(limits, draw, n), lengths=lengths, slide=slide)
+    values = placed(shape, draw, n, half=_mixed_half(limits, draw, n), lengths=lengths, slide=slide)
+    for parameter in shape.energy.parameters:  # such as a strain at which something yields: a ratio that is declared
+        if parameter.unit == "1" and not parameter.name.bold:
+            values[parameter.label] = values[parameter.label] * by_exponent(draw, _SMALLEST_RATIO, 1.0, n)
+    return values
 
 
 def _offsets(shape: Shape, limits: Limits, draw: Draw, n: int) -> dict[str, Array]:

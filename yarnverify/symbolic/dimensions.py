@@ -86,7 +86,12 @@ def dimension_of(expr: Expr, lookup: Callable[[Name], Dimension]) -> Dimension:
                 _common(expr.args, parts)  # only their ratio counts
                 return NUMBER
             if parts[0] != NUMBER:
-                raise DimensionError(f"{expr.value} of what is in {unit_text(parts[0])}")
+                needed = (
+                    "an angle or a plain number"
+                    if expr.value in ("sin", "cos", "tan", "cot")
+                    else "a plain number, such as a ratio"
+                )
+                raise DimensionError(f"{expr.value} of what is in {unit_text(parts[0])}; it takes {needed}")
             return NUMBER
     raise DimensionError(f"nothing is known of the dimension of {expr.op}")
 

@@ -65,10 +65,19 @@ def _run(path: Path) -> dict[str, Any]:
     return namespace
 
 
+_ELSEWHERE = {  # what other libraries call it
+    "acos": "arccos", "asin": "arcsin", "atan": "arctan", "arctan2": "atan2", "ln": "log", "norm": "length",
+    "normalize": "unit",
+    "cosh": "(exp(x) + exp(-x)) / 2", "sinh": "(exp(x) - exp(-x)) / 2", "tanh": "(exp(2 * x) - 1) / (exp(2 * x) + 1)",
+}  # fmt: skip
+
+
 def _told(error: Exception) -> str:
     """What an exception says, in one line, and what to do about the usual ones."""
     text = " ".join(str(error).split())
     if isinstance(error, NameError) and error.name:
+        if error.name in _ELSEWHERE:
+            return f"{text}; here it is {_ELSEWHERE[error.name]}"
         known = {name.lower(): name for name in (*FUNCTIONS, *_ANNOTATIONS)}
         near = [known[name] for name in difflib.get_close_matches(error.name.lower(), known, 1)]
         if error.name in near:

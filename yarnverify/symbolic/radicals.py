@@ -26,7 +26,7 @@ def _opens(base: Any) -> bool:
 
 
 def with_roots(value: Any) -> Any:
-    """A law or a derivative of one in factors, what stands under its roots as it is."""
+    """A law or a derivative of one as a sum of factors times roots, what stands under these as it is."""
     under = radicands(value)
     roots = {sp.Symbol(f"root_{i}", positive=True): base for i, base in enumerate(under)}
     named = value.replace(
@@ -34,32 +34,50 @@ def with_roots(value: Any) -> Any:
         lambda e: next(root for root, base in roots.items() if base == e.base) ** (2 * e.exp),
     )
     above, below = sp.fraction(sp.together(named))
-    for root, base in roots.items():
-        above = _lowered(above, root, base)
-        above, rest = sp.fraction(sp.together(above))
-        below = below * rest
-    found = _conjugate(sp.factor(above), roots) / sp.factor(below)
-    return found.subs({root: sp.sqrt(base) for root, base in roots.items()})
+    powers = {root: -sp.degree(below, root) for root in roots}
+    below = below.xreplace(dict.fromkeys(roots, sp.S.One)) if below.is_Mul or below.is_Pow or below in roots else below
+    if below.has(*roots):
+        return value  # roots within sums below the line stay as they are
+    parts: dict[
+        tuple[int, ...], Any
+    ] = {}  # by the parities of the roots' powers: of each the factor of the lowest ones
+    for degrees, factor in sp.Poly(sp.expand(above), *roots).terms():
+        whole = [power + degree for power, degree in zip(powers.values(), degrees, strict=True)]
+        parts.setdefault(tuple(power % 2 for power in whole), []).append((whole, factor))
+    found: list[tuple[Any, Any]] = []  # factor, product of roots
+    for terms in parts.values():
+        lowest = [min(whole[i] for whole, _ in terms) for i in range(len(roots))]
+        total = sp.S.Zero
+        for whole, factor in terms:
+            lifts = zip(roots.values(), whole, lowest, strict=True)
+            total += factor * sp.Mul(*(base ** ((power - low) // 2) for base, power, low in lifts))
+        found.append((sp.factor(total), sp.Mul(*(root**low for root, low in zip(roots, lowest, strict=True)))))
+    made = _paired(found, roots) / sp.factor(below)
+    return made.xreplace({root: sp.sqrt(base) for root, base in roots.items()})
 
 
-def _lowered(value: Any, root: Any, base: Any) -> Any:
-    """A polynomial in a root with its square put in: ``a + b root``."""
-    found = sp.S.Zero
-    for (power,), factor in sp.Poly(sp.expand(value), root).terms():
-        found += factor * base ** (power // 2) * root ** (power % 2)
-    return found
+def _paired(parts: list[tuple[Any, Any]], roots: dict[Any, Any]) -> Any:
+    """The sum of the parts, in which ``a root - b`` is written as ``(a^2 base - b^2)/(a root + b)`` where that is shorter."""
+    rest = list(sp.Add.make_args(sp.expand(next((factor for factor, product in parts if product == 1), sp.S.Zero))))
+    done = []
+    for factor, product in parts:
+        if product == 1:
+            continue
+        base, partner = roots.get(product), None
+        if base is not None and not sp.expand(factor).is_Add:
+            square = factor**2 * base
+            for each in rest:
+                opposite = each.as_coeff_Mul()[0] * factor.as_coeff_Mul()[0] < 0
+                if opposite and _size(square - each**2) < _size(square):
+                    partner = each
+                    break
+        if partner is None:
+            done.append(factor * product)
+            continue
+        rest.remove(partner)
+        done.append(sp.factor(square - partner**2) / (factor * product - partner))
+    return sp.Add(sp.factor(sp.Add(*rest)), *done)
 
 
-def _conjugate(value: Any, roots: dict[Any, Any]) -> Any:
-    """Products whose sums ``a root - b`` of positive a and b are written as ``(a^2 base - b^2)/(a root + b)``."""
-    return sp.Mul(*(_apart(factor, roots) for factor in sp.Mul.make_args(value)))
-
-
-def _apart(factor: Any, roots: dict[Any, Any]) -> Any:
-    for root, base in roots.items():
-        slope = factor.coeff(root, 1) if factor.is_Add else sp.S.Zero
-        rest = factor - slope * root
-        opposite = slope != 0 and not rest.has(*roots) and bool(slope.as_coeff_Mul()[0] * rest.as_coeff_Mul()[0] < 0)
-        if opposite and not slope.is_Add and not rest.is_Add:
-            return sp.factor(slope**2 * base - rest**2) / (slope * root - rest)
-    return factor
+def _size(value: Any) -> int:
+    return int(sp.count_ops(sp.factor(value)))

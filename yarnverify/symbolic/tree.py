@@ -127,6 +127,8 @@ class Expr:
     def __pow__(self, exponent: int) -> Expr:
         if not isinstance(exponent, int):
             instead = "exp(p * log(a)) for another power" if isinstance(exponent, Expr) else "sqrt(...) for a root"
+            if isinstance(exponent, float | Fraction) and 2 * exponent == int(2 * exponent) and abs(exponent) > 1:
+                instead = f"sqrt(...) ** {int(2 * exponent)}"
             given = "a formula" if isinstance(exponent, Expr) else repr(exponent)
             raise FormulaError(f"an exponent must be an integer, not {given}; write {instead}")
         return Expr("pow", (self,), exponent)
@@ -139,6 +141,11 @@ class Expr:
 
     def __gt__(self, other: Expr | int) -> Inequality:
         return Inequality(self, as_expr(other))
+
+    def __ge__(self, other: object) -> Inequality:
+        raise FormulaError("a domain is without its border: write > for >=, and < for <=")
+
+    __le__ = __ge__
 
     def _joined(self, op: str) -> tuple[Expr, ...]:
         return self.args if self.op == op else (self,)
