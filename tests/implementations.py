@@ -82,6 +82,11 @@ def stretch_forces_in_a_row(x0: Any, x1: Any, u0: Any, u1: Any, k_s: Any) -> Any
     return -force, force, -sliding, sliding
 
 
+def stretch_F(x0: Any, x1: Any, u0: float, u1: float, k_s: float) -> Any:
+    force, sliding = _segment(x0, x1, u0, u1, np.float64(k_s))
+    return -force, force, -sliding, sliding
+
+
 def stretch_forces_by_name(x0: Any, x1: Any, u0: float, u1: float, k_s: float) -> Any:
     force, sliding = _segment(x0, x1, u0, u1, np.float64(k_s))
     return {"F_x0": -force, "F_u1": sliding}

@@ -80,6 +80,7 @@ def test_kernels_of_the_package_pass(energy: str, variant: str) -> None:
         ("stretch_forces_in_a_row", {"layout": "element", "force": True, "returns": ("x0", "x1", "u0", "u1")}),
         ("stretch_forces_in_a_row", {"force": True}),
         ("stretch_forces_by_name", {}),
+        ("stretch_F", {}),
         ("gravity_by_name", {"regimes": ONE}),
         (
             "contact_of_other_names",
@@ -507,6 +508,21 @@ def dFu1_du1(x0, x1, u0, u1, ks):
     return -ks * l**2 / du**3
 def helper(x): return x
 """
+
+
+def test_tensors_where_the_target_imports_them(tmp_path: Path) -> None:
+    """A module of PyTorch's name, whose functions refuse what is no tensor of its own."""
+    (tmp_path / "torch.py").write_text(
+        "import numpy as np\nclass Tensor(np.ndarray): pass\n"
+        "def as_tensor(x): return np.asarray(x).view(Tensor)\n"
+        "def where(c, a, b): return np.where(c.layout_of if not isinstance(c, Tensor) else c, a, b)\n"
+    )
+    (tmp_path / "contact_of_tensors.py").write_text(
+        "import torch\n"
+        "def contact(u0, u1, kc, L, d): return 0.5 * kc * L * torch.where(u1 - u0 < d, (u1 - u0 - d) ** 2, 0.0 * u0)\n"
+    )
+    found = check(f"{tmp_path}/contact_of_tensors.py:contact", Options(energy="parallel_contact", count=3))
+    assert found.passes and [block.title for block, _ in found.found] == ["energy"]
 
 
 def test_a_library_without_that_function(library: str) -> None:

@@ -195,7 +195,9 @@ class Call:
     manner: Manner
     name: str
 
-    def __call__(self, q: Array, values: Mapping[str, Array], where: slice, layout: str) -> Any:
+    def __call__(
+        self, q: Array, values: Mapping[str, Array], where: slice, layout: str, made: Callable[[Any], Any]
+    ) -> Any:
         """What the function gives at some states.
 
         Parameters
@@ -206,19 +208,27 @@ class Call:
             Which states; one for the layout ``single``.
         layout
             As in ``conventions``.
+        made
+            Turns arrays and numbers into what the function takes.
         """
 
         def shaped(array: Array) -> Any:
             part = np.array(array[where])
             if layout == "single":
-                return part[0] if part.ndim == 2 else part[0][()]
-            return np.ascontiguousarray(part.T) if layout == "component" else part
+                return made(part[0] if part.ndim == 2 else part[0][()])
+            return made(np.ascontiguousarray(part.T) if layout == "component" else part)
 
         state = () if self.manner.by_name else (shaped(q),)
         positions = [shaped(values[name]) for name in self.manner.positions]
         return self.function(
             *state, *positions, **{key: shaped(values[name]) for key, name in self.manner.keywords.items()}
         )
+
+
+def makers() -> list[Callable[[Any], Any]]:
+    """What states may be turned into: nothing else, or tensors where the target has imported PyTorch."""
+    torch = sys.modules.get("torch")
+    return [lambda value: value, *([torch.as_tensor] if torch is not None else [])]
 
 
 def answers(value: Any, name: str, expected: int = 0) -> dict[str, Any]:
@@ -263,6 +273,11 @@ def flattened(value: Any, layout: str, n: int, what: str) -> Array:
     return np.ascontiguousarray(np.moveaxis(array, axis, 0).reshape(n, -1), dtype=np.float64)
 
 
+def _forces(function: str) -> bool:
+    """Whether a function calls itself a force: ``stretch_force``, ``Stretch_F``."""
+    return "force" in function.lower() or "F" in function.split("_")
+
+
 def guessed(
     parts: Sequence[tuple[str, int]], rows: int, function: str, pieces: Sequence[tuple[str, int]]
 ) -> list[str] | None:
@@ -273,9 +288,9 @@ def guessed(
     """
     sizes = [size for name, size in parts if name.startswith("#")]
     if len(parts) > 1 and len(sizes) == len(parts) and sizes == [size for _, size in pieces] and 3 in sizes:
-        return [f"F_{label}" if "force" in function.lower() else label for label, _ in pieces]
+        return [f"F_{label}" if _forces(function) else label for label, _ in pieces]
     words = function.lower()
-    forces = "force" in words and not any(size == 1 for _, size in parts)
+    forces = _forces(function) and not any(size == 1 for _, size in parts)
     found = []
     for name, size in parts:
         if not name.startswith("#"):

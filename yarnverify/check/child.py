@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.check.calls import TRIED, Call, answers, flattened, guessed, load, manner
+from yarnverify.check.calls import TRIED, Call, answers, flattened, guessed, load, makers, manner
 from yarnverify.check.conventions import LAYOUTS
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.files import write_record
@@ -82,7 +82,7 @@ def run_python(task: Task) -> None:
         found: dict[str, Array] = {}
         kind = "float64"
         for call in calls:
-            for name, part in answers(call(q, task.values, where, layout), call.name, len(said or ())).items():
+            for name, part in answers(call(q, task.values, where, layout, made), call.name, len(said or ())).items():
                 if said and name.startswith("#") and len(said) > int(name[1:]) and said[int(name[1:])] == "_":
                     continue
                 found[name] = flattened(part, layout, where.stop - where.start, name.replace("#", "answer "))
@@ -121,7 +121,14 @@ def run_python(task: Task) -> None:
 
     first = task.task["todo"][0][0]
     layouts = LAYOUTS if task.task["layout"] == "auto" else (task.task["layout"],)
-    chosen, names, kind = _layout(task, layouts, first, parts, fits)
+    ways = makers()
+    for made in ways:
+        try:
+            chosen, names, kind = _layout(task, layouts, first, parts, fits)
+            break
+        except InputError:
+            if made is ways[-1]:
+                raise
     found, _ = parts(_tried(chosen, first, len(q)), chosen)
     task.decide(
         {"layout": chosen, "returns": names, "dtype": kind, "by_name": calls[0].manner.by_name},
