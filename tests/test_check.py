@@ -654,11 +654,11 @@ def test_matlab_arrays_as_matlab_has_them(tmp_path: Path) -> None:
     [
         ("out.txt", "", "the name must end in .json, .npz, .mat or .csv"),
         ("out.mat", None, "cannot read: no such file"),
-        ("out.mat", "MATLAB", "is no MATLAB file: "),
+        ("out.mat", "MATLAB", r"is no MATLAB file of version 7 or older; write it with save\('-v7', 'out.mat', ...\)"),
         (
             "out.mat",
             f"{'MATLAB 7.3 MAT-file':124}\0\2IM",
-            r"is a MATLAB 7.3 file; save it with -v7: save\('out.mat', ..., '-v7'\)",
+            r"is a MATLAB 7.3 file; write it with save\('-v7', 'out.mat', ...\)",
         ),
         ("out.json", None, "cannot read: no such file"),
         ("out.json", "{", "out.json:1:2: "),

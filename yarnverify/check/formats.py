@@ -102,10 +102,14 @@ def _read_mat(path: Path) -> dict[str, Any]:
         with path.open("rb") as file:
             stored = loadmat(file)
     except NotImplementedError:
-        raise InputError(f"{path}: is a MATLAB 7.3 file; save it with -v7: save('{path.name}', ..., '-v7')") from None
-    except (MatReadError, ValueError, TypeError, EOFError, KeyError, IndexError) as error:
-        raise InputError(f"{path}: is no MATLAB file: {error}") from None
+        raise InputError(f"{path}: is a MATLAB 7.3 file; {_saved(path)}") from None
+    except (MatReadError, ValueError, TypeError, EOFError, KeyError, IndexError):
+        raise InputError(f"{path}: is no MATLAB file of version 7 or older; {_saved(path)}") from None
     return {name: value for name, value in stored.items() if not name.startswith("__")}
+
+
+def _saved(path: Path) -> str:
+    return f"write it with save('-v7', '{path.name}', ...)"
 
 
 def _read_json(path: Path) -> dict[str, Any]:
