@@ -208,8 +208,8 @@ def test_unknowns_in_each_others_place() -> None:
 
 
 def test_what_follows_from_a_wrong_energy_is_no_mistake_of_its_own() -> None:
-    energy = _shear(lambda a, dot, first, L: first / L * (a - np.pi / 2) ** 2 / 2)
-    assert said("shear", energy) == {"lacks a factor L/|x1 - x0|", "follows from the energy as it came"}
+    energy = _shear(lambda a, dot, first, L: first / L * (a - np.pi / 2) ** 2)
+    assert said("shear", energy) == {"is 2 |x1 - x0|/L times what it should be", "follows from the energy as it came"}
 
 
 def test_one_block_that_fits_another_law_is_not_that_law() -> None:

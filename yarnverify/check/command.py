@@ -148,6 +148,11 @@ def _judged(
             checked.hints = argument_hint(convention, cases, again, said)
         if again is not None and unknown and not checked.hints:
             checked.hints = order_hint(convention, cases, again)
+        wrong = [judge.formula.laws.of(block) for block, diagnosis in found if diagnosis.status == "wrong"]
+        if wrong and all(law is not None and law.text.startswith(("takes", "leaves")) for law in wrong):
+            checked.hints.append(
+                "if that law is meant: yarnverify init, declare it there, and check with --energy against it"
+            )
         checked.hints += triangle_hints(results, convention, cases, judge.plain & ran.done)
         checked.hints += stray_hints(found, results.stray)
     return checked

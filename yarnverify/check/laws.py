@@ -182,7 +182,7 @@ class Laws:
         product = self.cases.energy.expression
         for name, power in factor.powers:
             product = product * named[name] ** power if power > 0 else product / named[name] ** -power
-        found = self._explained("follows from the energy as it came", self._values(product))
+        found = self._explained("follows from the energy as it came", self._values(product), factor.number)
         self._follows = {place: explained for place, explained in found.items() if place[0] != "E"}
 
     def added(self, block: Block, at: Array) -> str:
@@ -223,8 +223,8 @@ class Laws:
         named = {name: value[where] for name, value in self.cases.points.parameters.items() if value.ndim == 1}
         return None if found is None else factored(found, named, self.tolerance)
 
-    def _explained(self, text: str, values: Values) -> dict[tuple[str, str], Explained]:
-        """The blocks that an energy explains, of the outputs of which it explains most of what it changes."""
+    def _explained(self, text: str, values: Values, unit: float = 1.0) -> dict[tuple[str, str], Explained]:
+        """The blocks that an energy, times a number, explains, of the outputs of which it explains most of what it changes."""
         found: dict[tuple[str, str], Factor] = {}
         for kind in "EGH":
             factors: dict[tuple[str, str], Factor | None] = {}
@@ -232,7 +232,7 @@ class Laws:
                 other = values[kind, block.name]
                 if self._factor(block, other, block.true) is None:
                     factors[kind, block.name] = self._factor(block, other, block.computed)
-            known = {place: factor for place, factor in factors.items() if factor is not None}
+            known = {place: replace(f, number=f.number / unit) for place, f in factors.items() if f is not None}
             if len(known) >= _MOST * len(factors):
                 found |= known
         whole = next((factor for factor in found.values() if factor.number), None)
