@@ -92,6 +92,11 @@ def gravity_by_name(x0: Any, x1: Any, u0: float, u1: float, rho: float, g: Any) 
     return {"V": -(u1 - u0) * per_length, "F": np.concatenate([force, force, [-per_length, per_length]])}
 
 
+def contact_of_other_names(left: float, right: float, stiffness: float, R: float) -> float:
+    """No name of the energy's."""
+    return stiffness * min(right - left - 4 * R, 0) ** 2 / 2
+
+
 def bending_of_a_chain(x0: Any, x1: Any, x2: Any, u1: float, u2: float, k_b: float) -> Any:
     """Points in the order of the yarn: the middle one comes second."""
     e, g, h = _of(bending, np.concatenate([x1, x0, x2, [u1, u2]])[:, None], k_b=k_b)
@@ -486,3 +491,22 @@ def bending_lower_triangle_doubled(q: Any, k_b: Any) -> Any:
 def bending_sum_with_transpose(q: Any, k_b: Any) -> Any:
     h = np.moveaxis(_of(bending, q, k_b=k_b)[2], -1, 0)
     return {"hessian": (2 * h - h * np.eye(11)).transpose(1, 2, 0)}
+
+
+def stretch_of_the_weight_alone(x0: Any, x1: Any, u0: float, u1: float, k_s: float) -> Any:
+    """The forces on u0 and u1 without the strain's own dependence on them."""
+    strain = np.linalg.norm(x1 - x0) / (u1 - u0) - 1
+    return {"F_u0": k_s * strain**2 / 2, "F_u1": -k_s * strain**2 / 2}
+
+
+def stretch_sign_of_the_projection(q: Any, k_s: Any) -> Any:
+    """I/du + P/l, which is also what two exchanged sliding coordinates and another sign would give."""
+    _, _, h = _of(stretch, q, k_s=k_s)
+    h[:6, :6] = 0
+    d = q[3:6] - q[:3]
+    length = np.sqrt((d * d).sum(axis=0))
+    one = np.eye(3)[:, :, None]
+    block = k_s * (one / (q[7] - q[6]) + (one - (d / length)[:, None] * (d / length)[None]) / length)
+    for rows, columns, sign in ((0, 0, 1), (3, 3, 1), (0, 3, -1), (3, 0, -1)):
+        h[rows : rows + 3, columns : columns + 3] = sign * block
+    return {"hessian": h}

@@ -81,6 +81,14 @@ def test_kernels_of_the_package_pass(energy: str, variant: str) -> None:
         ("stretch_forces_in_a_row", {"force": True}),
         ("stretch_forces_by_name", {}),
         ("gravity_by_name", {"regimes": ONE}),
+        (
+            "contact_of_other_names",
+            {
+                "energy": "parallel_contact",
+                "given": ("left=u0", "right=u1", "stiffness=k_c*L", "R=d/4"),
+                "regimes": ONE,
+            },
+        ),
         ("bending_of_a_chain", {"order": "x1,x0,x2,u1,u2", "given": ("x0=x1", "x1=x0")}),
     ],
 )
@@ -132,6 +140,11 @@ def test_single_precision_is_held_to_its_own_unit() -> None:
             "wrong: G[x0]: is minus the sum of other blocks as they came: no mistake of its own",
         ),
         ("bending_two_left_out", "wrong: H[x0,x0]: lacks x1, x2 and x2, x1: they are left out of a sum"),
+        ("stretch_of_the_weight_alone", "wrong: G[u0] G[u1]: is the energy over (u1 - u0): what is squared depends on"),
+        (
+            "stretch_sign_of_the_projection",
+            "H[x1,x0] H[x1,x1]: is off by a multiple of P_1: that term is wrong, or missing",
+        ),
         ("bending_reads_exchanged", "has x0 and x2 exchanged in what it reads, and not in what it gives"),
         (
             "bending_of_curvature",
@@ -353,7 +366,7 @@ def test_nothing_came_back() -> None:
             f"{ZOO}:stretch_stranger",
             {},
             InputError,
-            "youngs is no unknown or parameter of this energy.*--with youngs=FORMULA",
+            "youngs is no unknown or parameter of this energy.*--with youngs=FORMULA; q gets the whole state$",
         ),
         (f"{ZOO}:bending_by_name", {"returns": ("energy",)}, InputError, "it gives 3 results, and --returns names 1"),
         (f"{ZOO}:stretch_nowhere", {}, InputError, "there is no function stretch_nowhere; there are "),
@@ -445,6 +458,12 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> str:
         ("too_little", {}, False, "does not write number 3 of hessian, which has 4"),
         ("meddles", {}, False, "changes its inputs"),
         ("aborts", {}, False, "crashes: SIGABRT"),
+        (
+            "single",
+            {},
+            False,
+            "does not write number 1 of gradient, which has 2: are its numbers float? Then say --float32",
+        ),
     ],
 )
 def test_c_functions(library: str, function: str, options: dict[str, Any], passes: bool, text: str) -> None:
@@ -458,6 +477,36 @@ def test_another_order_of_the_arguments_is_found(library: str) -> None:
     (hint,) = check(f"{library}:radius_first", options).hints
     assert hint == "matches with the arguments in another order: --with R=d/4 --with kc=k_c --with L=L"
     assert check(f"{library}:radius_first", replace(options, given=("R=d/4", "kc=k_c", "L=L"))).passes
+
+
+def test_a_file_with_a_function_for_each_block(tmp_path: Path) -> None:
+    path = tmp_path / "stretch_blocks.py"
+    path.write_text(_BLOCKS)
+    found = check(str(path), Options(count=3))
+    assert found.passes and [block.title for block, _ in found.found] == [
+        "gradient x1", "gradient u1", "Hessian x1, x1", "Hessian u1, u1",
+    ]  # fmt: skip
+
+
+_BLOCKS = """
+import numpy as np
+def _parts(x0, x1, u0, u1):
+    l = np.linalg.norm(x1 - x0)
+    return l, (x1 - x0) / l, u1 - u0
+def Fx1(x0, x1, u0, u1, ks):
+    l, d, du = _parts(x0, x1, u0, u1)
+    return -ks * (l - du) / du * d
+def Fu1(x0, x1, u0, u1, ks):
+    l, _, du = _parts(x0, x1, u0, u1)
+    return ks * (l - du) * (l + du) / (2 * du**2)
+def dFx1dx1(x0, x1, u0, u1, ks):
+    l, d, du = _parts(x0, x1, u0, u1)
+    return ks / l * (np.eye(3) - np.outer(d, d)) - ks / du * np.eye(3)
+def dFu1_du1(x0, x1, u0, u1, ks):
+    l, _, du = _parts(x0, x1, u0, u1)
+    return -ks * l**2 / du**3
+def helper(x): return x
+"""
 
 
 def test_a_library_without_that_function(library: str) -> None:

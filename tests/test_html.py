@@ -129,6 +129,17 @@ def test_the_summary_says_what_the_records_say() -> None:
     assert brief(found | {"accuracy": None, "benchmark": None, "simulation": None, "analysis": None}) == []
 
 
+def test_the_summary_bears_states_without_a_true_result() -> None:
+    """As in the regime without value of an energy that has none there at all."""
+    found = copy.deepcopy(records())
+    before = dict(brief(found))["accuracy"]
+    cell = next(
+        cell for cell in found["accuracy"]["cells"] if (cell["variant"], cell["dtype"]) == ("printed", "float64")
+    )
+    found["accuracy"]["cells"].append(cell | {"outputs": {output: {"worst": None} for output in "EGH"}})
+    assert dict(brief(found))["accuracy"] == before.replace("27 of 45", "27 of 46") != before
+
+
 def test_speed_in_the_summary_is_that_of_the_default_kernels() -> None:
     found = copy.deepcopy(records())
     energies = found["benchmark"]["energies"]

@@ -137,10 +137,21 @@ def test_names_cover_no_spot_no_line_and_no_other_name() -> None:
 
 def test_no_leader_runs_through_another_name() -> None:
     """Two spots at the edge, one above the other, shut in by lines and by spots beside them: the best front of shear."""
-    fronts = {"fast compiled": (37.0, 30.0), "accurate compiled": (37.0, 18.0)}
-    spots = fronts | {"fast": (58.0, 30.0), "accurate": (68.0, 18.0), "numba": (52.0, 39.0)}
-    lines = [((37.0, 30.0), (37.0, 150.0)), ((37.0, 18.0), (250.0, 18.0))]
-    found = places(fronts, spots, lines, (0.0, 0.0, 260.0, 160.0))
+    fronts = {"fast compiled": (80.0, 99.0), "accurate compiled": (80.0, 87.0)}
+    spots = fronts | {
+        "fast": (101.0, 99.0),
+        "accurate": (109.0, 87.0),
+        "numba": (93.0, 108.0),
+        "printed": (99.0, 108.0),
+    }
+    spots |= {
+        "casadi": (97.0, 112.0),
+        "jax": (115.0, 112.0),
+        "lambdify": (124.0, 108.0),
+        "jax as written": (144.0, 112.0),
+    }
+    lines = [((80.0, 361.0), (80.0, 99.0)), ((80.0, 99.0), (80.0, 87.0)), ((80.0, 87.0), (366.0, 87.0))]
+    found = places(fronts, spots, lines, (56.0, 60.0, 383.0, 361.0))
     (one, _), (other, _) = found.values()
     assert any(led for _, led in found.values())
     for (name, (shift, led)), (beside, there) in (

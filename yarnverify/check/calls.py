@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.check.conventions import ALIASES, SIGNED
+from yarnverify.check.conventions import ALIASES, SIGNED, force_block
 from yarnverify.errors import InputError, NotRunError
 
 Array = NDArray[Any]
@@ -22,14 +22,16 @@ Function = Callable[..., Any]
 TRIED = 5  # states of a first batch: a number that no row or axis has
 
 
-def load(target: str) -> dict[str, Function]:
+def load(target: str, labels: Sequence[str] = ()) -> dict[str, Function]:
     """The functions of a target, by what they return: ``""`` for a single function that a person named.
 
     Parameters
     ----------
     target
         ``module:function``, ``file.py:function``; or a module or file alone, whose functions are called energy, gradient or
-        force, hessian or jacobian, or which has only one.
+        force, hessian or jacobian, or after a block, such as Fx1 or dFx1dx1, or which has only one.
+    labels
+        The energy's unknowns, which blocks are named after.
 
     Raises
     ------
@@ -49,7 +51,7 @@ def load(target: str) -> dict[str, Function]:
         return {"": found}
     meant = {}
     for attribute, value in vars(module).items():
-        if attribute in SIGNED and callable(value):
+        if callable(value) and (attribute in SIGNED or force_block(attribute, labels)):
             meant[attribute] = value
     if meant:
         return meant
@@ -157,7 +159,7 @@ def manner(
     def value_of(argument: inspect.Parameter) -> str | None:
         return argument.name if argument.name in values else by_likeness.get(alike(argument.name))
 
-    by_name = any(value_of(a) in unknowns for a in named)
+    by_name = any(value_of(a) in unknowns for a in named) or (bool(named) and value_of(named[0]) is not None)
     rest = named if by_name else named[1:]
     keywords, positions = {}, []
     strange = [a.name for a in rest if value_of(a) is None and a.default is a.empty]
@@ -167,6 +169,7 @@ def manner(
             f"{where}: {', '.join(strange)} {'is no unknown or parameter' if few else 'are no unknowns or parameters'} of "
             f"this energy ({', '.join(values)}); say what {'it is' if few else 'they are'}: "
             + " ".join(f"--with {name}=FORMULA" for name in strange)
+            + ("" if by_name else f"; {named[0].name} gets the whole state")
         )
     for argument in rest:
         meant = value_of(argument)

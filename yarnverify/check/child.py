@@ -70,7 +70,7 @@ def run_python(task: Task) -> None:
     """Call a Python function."""
     target, q = task.task["target"], task.q
     rows = q.shape[1]
-    functions = load(target)
+    functions = load(target, [label for label, _ in task.task["pieces"]])
     unknowns, parameters = task.task["unknowns"], task.task["parameters"]
     calls = [
         Call(function, manner(function, unknowns, list(task.values), parameters, target), name)

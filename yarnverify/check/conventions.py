@@ -200,14 +200,10 @@ def output_named(
         return Output(text, kind, sign, () if kind == "E" else every, every if kind == "H" else ())
     places = dict(labels)
     parts = [part.strip() for part in re.split(r"[,:]", text)]
-    for pattern, kind in (
-        (r"f_?(.+)", "G"),
-        (r"df_?(.+?)_?/?d_?(.+)", "H"),
-    ):  # as the document writes forces: F_x1, dF_x1/du1
-        found = re.fullmatch(pattern, text, re.IGNORECASE)
-        if found is not None and all(name in places for name in found.groups()):
-            blocks = [_rows_of(convention, places[name]) for name in found.groups()]
-            return Output(text, kind, -1, blocks[0], blocks[1] if kind == "H" else (), False)
+    of_force = force_block(text, list(places))
+    if of_force:
+        blocks = [_rows_of(convention, places[part]) for part in of_force]
+        return Output(text, "GH"[len(blocks) - 1], -1, blocks[0], blocks[1] if len(blocks) == 2 else (), False)
     if len(parts) > 2 or any(part not in places for part in parts):
         raise InputError(
             f"{where}: {text!r} is no output; there are energy, gradient or force, hessian or jacobian, blocks of the gradient "
@@ -218,6 +214,15 @@ def output_named(
     if len(parts) == 1:
         return Output(text, "G", -1 if convention.force else 1, rows[0], (), False)
     return Output(text, "H", -1 if convention.jacobian else 1, rows[0], rows[1], False)
+
+
+def force_block(text: str, labels: Sequence[str]) -> tuple[str, ...]:
+    """The unknowns of a block of the force or its Jacobian, as the document and code write them: F_x1, dF_x1/du1, dFx1dx1."""
+    for pattern in (r"f_?(.+)", r"df_?(.+?)_?/?d_?(.+)"):
+        found = re.fullmatch(pattern, text, re.IGNORECASE)
+        if found is not None and all(name in labels for name in found.groups()):
+            return found.groups()
+    return ()
 
 
 def text_pair(places: Mapping[str, slice]) -> str:

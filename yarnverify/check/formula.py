@@ -109,6 +109,8 @@ class Formula:
             return Mistake(text, known, -1)
         if known is not None:
             return Mistake(_factor_text(known), known, 1 if known.number > 0 else -1)
+        if text := self._spread_alone(block, computed, at):
+            return Mistake(text)
         for sign in (1, -1):
             if found is not None:
                 text = self._right_angle(sign * found, where) or self._rounded(sign * found, where)
@@ -199,6 +201,15 @@ class Formula:
         return (
             "holds first derivatives only (Gauss-Newton): the term with the measure's own second derivative is missing"
         )
+
+    def _spread_alone(self, block: Block, computed: Array, at: Array) -> str:
+        """The energy over the difference of sliding coordinates: as if its measure did not depend on that."""
+        if block.kind != "G" or block.computed.shape[0] != 1:
+            return ""
+        for name, value in self.named(at).items():
+            if name.startswith("(u") and self._same(np.abs(computed), np.abs(self.cases.truth.energy[at] / value)):
+                return f"is the energy over {name}: what is squared depends on {name} too"
+        return ""
 
     def definite(self, block: Block, computed: Array, at: Array) -> str:
         """Whether a Hessian's block is that of the nearest one without negative eigenvalues."""

@@ -261,7 +261,8 @@ class Laws:
         best: dict[tuple[str, str], Explained] = {}
         for text, values in self._tried():
             found = self._explained(text, values)
-            best = found if len(found) > len(best) else best
+            turned = "exchanged" in text and any(explained.sign < 0 for explained in found.values())
+            best = found if len(found) > len(best) and not turned else best
         return best
 
     @cached_property

@@ -46,7 +46,11 @@ class Buffer:
         missing = np.flatnonzero(self.bits[GUARD : GUARD + self.size] == self.mark)
         if missing.size:
             which = f"number {missing[0]}" if missing.size < self.size else "anything"
-            return f"does not write {which} of {self.name}, which has {self.size}"
+            half = (
+                self.bits.itemsize == 8 and missing[0] == self.size // 2 > 0 and missing.size == self.size - missing[0]
+            )
+            hint = ": are its numbers float? Then say --float32" if half else ""
+            return f"does not write {which} of {self.name}, which has {self.size}{hint}"
         return ""
 
 

@@ -38,7 +38,7 @@ def _accuracy(record: Mapping[str, Any]) -> Iterator[str]:
         yield f"The default kernels' worst error is {size}, over {len(own)} kinds of hard states {where}."
     printed = [cell for cell in cells if cell["variant"] == "printed"]
     if printed:
-        lost = sum(any(each["label"] in _LOST for each in cell["outputs"].values()) for cell in printed)
+        lost = sum(any(each.get("label") in _LOST for each in cell["outputs"].values()) for cell in printed)
         yield f"The formulas as printed lose digits, or have no value, on {lost or 'none'} of {len(printed)}."
 
 
