@@ -170,8 +170,8 @@ def test_values_slopes_and_bends_are_those_of_long_differences(
             assert error <= 16 * 2.0**-53 * mpmath.norm(true) + mpmath.mpf(10) ** -35
 
 
-@pytest.mark.parametrize("name", ["hertz", "thick", "lennard_jones", "yielding", "two_roots"])
-@pytest.mark.parametrize("regime", ["moderate", "ratios", "scales"])
+@pytest.mark.parametrize("name", ["hertz", "thick", "lennard_jones", "yielding", "two_roots", "smoothed"])
+@pytest.mark.parametrize("regime", ["moderate", "ratios", "scales", "without value"])
 def test_hard_cases_cost_no_more_than_is_promised(folder: Path, name: str, regime: str) -> None:
     """Roots of numbers and pi in twice the digits; multiples of lengths in sums; high powers of large and small lengths."""
     variants = ("fast", "accurate", "reference")
@@ -203,12 +203,13 @@ def test_what_is_slack_may_have_no_length(folder: Path) -> None:
 
 
 @needs_compiler
-def test_the_c_source_knows_where_an_energy_is_slack(folder: Path, tmp_path: Path) -> None:
-    """Also without length, where the digits below the last of a length are none."""
-    lines = export("tether", tmp_path, folder, 6, False)
+@pytest.mark.parametrize("name", ["tether", "smoothed"])
+def test_the_c_source_knows_what_holds_without_length(folder: Path, tmp_path: Path, name: str) -> None:
+    """Where an energy is slack, which has digits below the last of no length; and where it is smooth."""
+    lines = export(name, tmp_path, folder, 6, False)
     assert "promises no digits" not in lines[-1]
-    build(tmp_path, "tether_test.c", "tether.c", "-o", "tether_test")
-    assert subprocess.run([tmp_path / "tether_test"], capture_output=True).returncode == 0
+    build(tmp_path, f"{name}_test.c", f"{name}.c", "-o", "held")
+    assert subprocess.run([tmp_path / "held"], capture_output=True).returncode == 0
 
 
 AREA = """
@@ -255,6 +256,31 @@ def test_code_that_takes_a_normal_for_one_is_tried_on_normals(
     monkeypatch.chdir(tmp_path)
     arguments = ("mine.py", "--energy", f"contact{status}/sliding", "--returns", "v1", "--force")
     assert caller(monkeypatch, capsys)("check", *arguments)[0] == status
+
+
+@pytest.mark.parametrize(
+    ("variant", "dtype"),
+    [
+        ("fast", np.float64),
+        ("accurate", np.float64),
+        ("reference", np.float64),
+        ("fast", np.float32),
+        ("accurate", np.float32),
+    ],
+)
+def test_laws_of_a_squared_length_are_smooth_where_it_is_zero(folder: Path, variant: str, dtype: Any) -> None:
+    """``k (sqrt(l^2 + h^2) - h)`` has no slope there, and ``k/h`` for a bend in every direction."""
+    ends = np.array([[0.5, -1, 2, 0.5, -1, 2], [0.5, -1, 2, 0.5, 2, 6]], dtype).T
+    smoothed = kernel(variant, "smoothed", folder)
+    energies, slopes, bends = smoothed.evaluate(ends, k=3.0, h=0.5)
+    part = 6 * np.eye(3)
+    assert energies[0] == 0 and not slopes[:, 0].any() and np.abs(slopes[:, 1]).max() > 2
+    assert np.abs(bends[:, :, 0] - np.block([[part, -part], [-part, part]])).max() <= 1e-6
+    assert not smoothed.gradient(ends, k=3.0, h=0.5)[:, 0].any()
+    assert smoothed.hessian(ends, k=3.0, h=0.5)[:, :, 0].tolist() == bends[:, :, 0].tolist()
+    for name, values in (("yielding", {"Y": 1, "L": 1, "e_0": 1}), ("lennard_jones", {"epsilon": 1, "sigma": 1})):
+        with pytest.raises(ElementError, match="element 0: the segment x0-x1 has length zero"):
+            kernel("accurate", name, folder).energy(ends, **values)
 
 
 def test_whatever_is_measured_from_a_given_place_or_speed_is_proved(folder: Path) -> None:

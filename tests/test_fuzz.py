@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import threading
+import time
 import warnings
 from types import SimpleNamespace
 from typing import Any
@@ -258,3 +260,20 @@ def test_without_hypothesis_the_command_says_what_to_install() -> None:
     )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (shown.returncode, shown.stderr) == (3, "the search needs Hypothesis: pip install 'yarnverify[fuzz]'\n")
+
+
+def test_an_alarm_waits_until_the_collector_is_timed() -> None:
+    """Of an error in there Python prints a trace, and goes on as if nothing had been."""
+    reached = []
+
+    def gc_callback() -> None:
+        end = time.monotonic() + 0.1
+        while time.monotonic() < end:
+            pass
+        reached.append(rung.is_set())
+
+    rung = threading.Event()
+    with pytest.raises(search._Stop), search._alarm(0.02, rung):
+        gc_callback()
+        time.sleep(5)
+    assert reached == [True]

@@ -84,6 +84,9 @@ class Kernel:
     factors
         The largest number of lengths, coordinates and parameters in a product: the more there are, the smaller the sizes of
         which a power might not fit.
+    even
+        Where the energy is smooth though its only length is zero, as a law of the square of a length is: the first rows of its
+        two ends.
     promise
         How large errors are, where the variant does not say it: a few ``units`` in the last place, no more than the
         ``condition`` of the state explains, or ``none`` for formulas that lose digits near singular states.
@@ -98,6 +101,7 @@ class Kernel:
     numbers: Literal["float", "words", "double-double"] = "float"
     promise: Literal["units", "condition", "none"] = "units"
     factors: int = MOST_FACTORS
+    even: tuple[int, int] | None = None
     loops: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # compiled ones, as they are made
     _tapes: dict[Any, Tape] = field(default_factory=dict, compare=False, repr=False)
 

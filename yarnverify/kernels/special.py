@@ -12,6 +12,8 @@ from yarnverify.kernels.wide import rounded, run_wide, serves
 if TYPE_CHECKING:
     from yarnverify.kernels.batch import Batch
 
+_HAIR = 2.0**-600  # a length whose square is nothing beside any number of double precision
+
 
 class Special:
     """Chosen elements of a batch, their results so far, (outputs, m), and the reasons of those that have none."""
@@ -25,6 +27,7 @@ class Special:
                 self._reasons[wrong & (self._reasons == "")] = f"{label} is {text}"
         self._rows, self._values = np.where(np.isfinite(rows), rows, 0), batch.values_at(elements)
         self._found = np.empty((batch.count, elements.size), batch.dtype)
+        self._met = self._parted()
 
     def settle(self) -> None:
         """Give the batch their results, and the reasons of those without."""
@@ -33,10 +36,24 @@ class Special:
             self._in_double()
         else:
             self._by_shapes()
+        if self._met.any():  # every direction is as good as the one that they were parted in
+            start = int("E" in batch.wanted)
+            self._found[start : start + batch.dof * ("G" in batch.wanted), self._met] = 0
         bad = ~np.isfinite(self._found).all(axis=0) & (reasons == "")
         reasons[bad] = f"the result is not finite: it or a value on the way is outside the range of {batch.dtype}"
         batch.scatter(self._elements, self._found)
         batch.reasons.update((int(self._elements[i]), str(reasons[i])) for i in np.flatnonzero(reasons != ""))
+
+    def _parted(self) -> Array:
+        """Which elements of an even law have no length; their ends are moved apart by next to nothing."""
+        even, rows = self._batch.kernel.even, self._rows
+        if even is None or self._batch.dtype != np.float64:  # single precision's are evaluated in double
+            return np.zeros(self._elements.size, bool)
+        first, second = even
+        met: Array = (rows[first : first + 3] == rows[second : second + 3]).all(axis=0) & (self._reasons == "")
+        rows[first : first + 3, met] = rows[second : second + 3, met] = 0
+        rows[first, met] = _HAIR
+        return met
 
     def _in_double(self) -> None:
         """Single precision's elements in double precision, whose range holds their products."""

@@ -17,7 +17,7 @@ from yarnverify.symbolic.declare import Energy, load_declarations
 from yarnverify.symbolic.dimensions import scaling_powers
 from yarnverify.symbolic.emit import dof_labels, given_symbols
 from yarnverify.symbolic.printing import TEMPLATES, statements
-from yarnverify.symbolic.programs import derived_programs, proved
+from yarnverify.symbolic.programs import derived_programs, even_ends, proved
 from yarnverify.symbolic.reading import UnsupportedError
 from yarnverify.symbolic.steps import Program
 
@@ -186,10 +186,12 @@ def c_texts(name: str, folder: Path) -> tuple[dict[str, str], bool]:
             )
     found = proved(energy, declarations)
     programs, notes = derived_programs(energy, found, "accurate")
-    return _texts(energy, programs, notes), bool(found.shapes or found.rational)
+    return _texts(energy, programs, notes, even_ends(energy, found)), bool(found.shapes or found.rational)
 
 
-def _texts(energy: Energy, programs: list[Program], notes: list[str]) -> dict[str, str]:
+def _texts(
+    energy: Energy, programs: list[Program], notes: list[str], even: tuple[int, int] | None = None
+) -> dict[str, str]:
     labels = dof_labels(energy.unknowns)
     rows = [label.replace(".", "") for label in labels]
     whole, by_name = scaling_powers(energy)
@@ -212,6 +214,7 @@ def _texts(energy: Energy, programs: list[Program], notes: list[str]) -> dict[st
         "chosen": programs[0].choice is not None,
         "points": points,
         "whole": whole,
+        "even": even,
         "scaling": "none" if len(points) < 6 else "points" if angles_alone else "lengths",
     }
     return {

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import sympy as sp
+
+from yarnverify.symbolic.measures import differentiate, scalar_symbol
 from yarnverify.symbolic.safe import Safe
 from yarnverify.symbolic.tree import Expr, Name
 
@@ -26,6 +29,15 @@ def reach(shape: Safe) -> int:
     keys = shape.derivation.measures
     bends = (shape.slopes["tree"](shape.slopes["dd"](key, other)) for key in keys for other in keys)
     return max(max(_degrees(tree)) for tree in (shape.law, *_slopes(shape), *bends))
+
+
+def is_even(shape: Safe) -> bool:
+    """Whether a law of one length holds of its square alone, with finite derivatives where it is zero."""
+    length, law = scalar_symbol(shape.derivation.measures[0].symbol), shape.derivation.law
+    if law.has(sp.Abs, sp.sign) or sp.expand(law.xreplace({length: -length}) - law) != 0:
+        return False
+    there = (value.subs(length, 0) for value in (law, differentiate(law, length, length)))
+    return not any(value.has(sp.zoo, sp.oo, sp.nan) for value in there)
 
 
 def _slopes(shape: Safe) -> Iterator[Expr]:

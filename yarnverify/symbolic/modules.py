@@ -17,6 +17,7 @@ from yarnverify.symbolic.printing import LIBRARY, TEMPLATES, statements, text_of
 from yarnverify.symbolic.programs import (
     Proved,
     derived_programs,
+    even_ends,
     library_calls,
     most_factors,
     numbers,
@@ -202,6 +203,7 @@ def module_text(
         "promise": promise(variant, found, LIBRARY & set(tape)),
         "numbers": numbers(variant, found),
         "factors": most_factors(found),
+        "even": even_ends(energy, found),
         "public": (
             ("energy", "(n,)", "Energy of each element", energy.unit, "Array"),
             ("gradient", vector, "Gradient, the negative of the force", f"{energy.unit}/m", "Array"),

@@ -8,7 +8,7 @@ from typing import Any
 
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.kernels.batch import MOST_FACTORS
-from yarnverify.symbolic.cancelling import cancels, reach
+from yarnverify.symbolic.cancelling import cancels, is_even, reach
 from yarnverify.symbolic.court import Court, Finding, Verdict
 from yarnverify.symbolic.declare import Declarations, Energy
 from yarnverify.symbolic.derive import Derivation, declared_section, derive_declared
@@ -200,6 +200,15 @@ def most_factors(found: Proved) -> int | None:
     """The largest number of factors in a product of a law without angles, where it is more than kernels reckon with."""
     most = max((reach(shape) for shape in found.shapes if shape.corner is None), default=0)
     return most if most > MOST_FACTORS else None
+
+
+def even_ends(energy: Energy, found: Proved) -> tuple[int, int] | None:
+    """The first rows of the two ends of an energy that is an even law of the length between them, smooth where it is zero."""
+    shape = found.shapes[0] if found.shapes else None
+    if shape is None or shape.corner is not None or len(shape.lengths) != 1 or len(energy.unknowns) != 2:
+        return None
+    segment = shape.lengths[0].a
+    return (3, 0) if {segment.head, segment.tail} == set(energy.unknowns) and is_even(shape) else None
 
 
 def numbers(variant: str, found: Proved) -> str:
