@@ -207,6 +207,17 @@ def test_unknowns_in_each_others_place() -> None:
     assert "has the wrong sign, as with u1 and u2 exchanged" in said("bending", turned, outputs="E")
 
 
+def test_one_zero_in_compression_is_no_law() -> None:
+    """Such as of a result that underflows: one of several states in which the yarn is shorter than at rest."""
+    regimes = ("moderate", "near rest")
+    cases = hard_cases("stretch", None, "float64", 6, regimes)
+    assert cases.shorter is not None
+    last = np.arange(len(cases)) == np.flatnonzero(cases.shorter)[-1]
+    assert cases.shorter.sum() > 1
+    energy = _stretch(lambda h, r: r * np.where(last, 0 * h, np.log(h / r) ** 2) / 2)
+    assert said("stretch", energy, regimes=regimes) == {"takes the logarithmic strain log(l/r) for l/r - 1"}
+
+
 def test_what_follows_from_a_wrong_energy_is_no_mistake_of_its_own() -> None:
     energy = _shear(lambda a, dot, first, L: first / L * (a - np.pi / 2) ** 2)
     assert said("shear", energy) == {"is 2 |x1 - x0|/L times what it should be", "follows from the energy as it came"}

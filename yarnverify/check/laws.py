@@ -160,9 +160,12 @@ class Laws:
         return replace(found, text=f"{found.text}, and is zero where the yarn is shorter than at rest")
 
     def _slack(self, block: Block, source: Array) -> Array:
-        """(n,) bool: where a block is zero and the yarn shorter than at rest, as people have it who want no compression."""
+        """(n,) bool: where the yarn is shorter than at rest, if a block is zero there, as of people who want no compression."""
         shorter = self.cases.shorter
-        return np.zeros(len(self.cases), bool) if shorter is None else block.judged & shorter & ~source.any(axis=0)
+        where = np.zeros(len(self.cases), bool) if shorter is None else block.judged & shorter & block.true.any(axis=0)
+        zero = np.logical_not(source.any(axis=0))
+        most = bool(where.any() and zero[where].mean() > _MOST)
+        return np.asarray(where & zero & most)
 
     @cached_property
     def exchanged(self) -> str:
