@@ -354,6 +354,15 @@ def stretch_of_weft(q: Any, k_s: Any) -> Any:
     return {"hessian": whole}
 
 
+def bending_of_weft(x0: Any, x1: Any, x2: Any, u1: float, u2: float, k_b: float) -> Any:
+    """The second derivative by v2 in the place of u2, from an angle by its cosine, which loses digits elsewhere."""
+    a, b = (x1 - x0) / np.linalg.norm(x1 - x0), (x0 - x2) / np.linalg.norm(x0 - x2)
+    curved = 2 * k_b * np.arccos(np.clip(a @ b, -1, 1)) ** 2 / (u1 - u2) ** 3
+    whole = np.zeros((13, 13))
+    whole[9, 9], whole[11, 11] = curved, curved
+    return {"hessian": whole}
+
+
 def stretch_with_a_step(q: Any, k_s: Any) -> Any:
     """Minus the squared time step times the Jacobian of the force."""
     _, g, h = _of(stretch, q, k_s=k_s)

@@ -252,6 +252,11 @@ def test_a_number_in_a_hint_is_as_short_as_it_may_be() -> None:
     assert number_text(1e-6, expression=True) == "1e-06"
 
 
+def test_an_entry_in_the_place_of_the_other_yarn_is_found_besides_lost_digits() -> None:
+    (*_, hint) = checked("bending_of_weft", order="x0,x1,x2,u1,v1,v2,u2").hints
+    assert hint == "the Hessian u2, u2 came in the place of v2 by v2"
+
+
 def test_no_sign_fits_blocks_that_differ_even_where_all_fail() -> None:
     found = checked("bending_mixed_signs_losing")
     assert not any(block.passes for block, _ in found.found)

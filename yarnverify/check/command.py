@@ -154,7 +154,7 @@ def _judged(
                 "if that law is meant: yarnverify init, declare it there, and check with --energy against it"
             )
         checked.hints += triangle_hints(results, convention, cases, judge.plain & ran.done)
-        checked.hints += stray_hints(found, results.stray)
+        checked.hints += stray_hints(found, results.stray, judge.plain)
     return checked
 
 

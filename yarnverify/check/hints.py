@@ -157,15 +157,15 @@ def triangle_hints(results: Results, convention: Convention, cases: Cases, plain
     return [text] if text else []
 
 
-def stray_hints(found: Found, stray: Mapping[str, Array]) -> list[str]:
+def stray_hints(found: Found, stray: Mapping[str, Array], plain: Array) -> list[str]:
     """Numbers that came in the row or column of a coordinate that the energy does not have."""
     texts, left = [], dict(stray)
     for block, _ in found:
         if block.kind != "H" or block.computed.shape[0] != 1 or block.computed.any():
             continue
         for label, values in left.items():
-            at = block.judged & np.isfinite(values) & (block.true[0] != 0)
-            if at.any() and np.abs(np.abs(values[at] / block.true[0, at]) - 1).max() < 1e-3:
+            at = plain & block.judged & np.isfinite(values) & (block.true[0] != 0)
+            if at.any() and np.abs(values[at] / block.true[0, at] - 1).max() < 1e-3:
                 texts.append(f"the Hessian {block.name.replace(',', ', ')} came in the place of {label}")
                 del left[label]
                 break
