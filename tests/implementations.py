@@ -8,6 +8,7 @@ import time
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array
 
 from yarnverify.kernels.accurate import bending, shear, stretch
 from yarnverify.kernels.printed import bending as printed
@@ -80,6 +81,13 @@ def _segment(x0: Any, x1: Any, u0: Any, u1: Any, k_s: Any) -> tuple[Any, Any]:
 def stretch_forces_in_a_row(x0: Any, x1: Any, u0: Any, u1: Any, k_s: Any) -> Any:
     force, sliding = _segment(x0, x1, u0, u1, k_s)
     return -force, force, -sliding, sliding
+
+
+def stretch_sparse(q: Any, k_s: float) -> Any:
+    """As assembled from triplets."""
+    _, g, h = _of(stretch, q[:, None], k_s=k_s)
+    rows, columns = np.nonzero(h[..., 0] == h[..., 0])
+    return {"force": -g[:, 0], "jacobian": coo_array((-h[rows, columns, 0], (rows, columns)), shape=(8, 8))}
 
 
 def stretch_F(x0: Any, x1: Any, u0: float, u1: float, k_s: float) -> Any:
@@ -524,3 +532,16 @@ def stretch_sign_of_the_projection(q: Any, k_s: Any) -> Any:
     for rows, columns, sign in ((0, 0, 1), (3, 3, 1), (0, 3, -1), (3, 0, -1)):
         h[rows : rows + 3, columns : columns + 3] = sign * block
     return {"hessian": h}
+
+
+class Segment:
+    """Code of objects."""
+
+    def __init__(self, k_s: float) -> None:
+        self.k_s = k_s
+
+    def stretch(self, x0: Any, x1: Any, u0: float, u1: float) -> float:
+        return float(self.k_s * (np.linalg.norm(x1 - x0) - u1 + u0) ** 2 / (2 * (u1 - u0)))
+
+
+segment = Segment(2.0)

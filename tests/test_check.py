@@ -30,7 +30,7 @@ COMPILER = shutil.which("cc") or shutil.which("gcc")
 
 def checked(name: str, energy: str | None = None, **options: Any) -> Checked:
     return check(
-        f"{ZOO}:{name}" if name[0].islower() and "." not in name else name, Options(energy=energy, count=6, **options)
+        name if name.startswith("yarnverify.") else f"{ZOO}:{name}", Options(energy=energy, count=6, **options)
     )
 
 
@@ -81,6 +81,8 @@ def test_kernels_of_the_package_pass(energy: str, variant: str) -> None:
         ("stretch_forces_in_a_row", {"force": True}),
         ("stretch_forces_by_name", {}),
         ("stretch_F", {}),
+        ("stretch_sparse", {}),
+        ("segment.stretch", {"energy": "stretch", "fix": ("k_s=2",)}),
         ("gravity_by_name", {"regimes": ONE}),
         (
             "contact_of_other_names",
@@ -372,9 +374,15 @@ def test_nothing_came_back() -> None:
             f"{ZOO}:stretch_stranger",
             {},
             InputError,
-            "youngs is no unknown or parameter of this energy.*--with youngs=FORMULA; q gets the whole state$",
+            "youngs is no .*--with youngs=FORMULA; q gets the whole state, or write a function of those names around it$",
         ),
         (f"{ZOO}:bending_by_name", {"returns": ("energy",)}, InputError, "it gives 3 results, and --returns names 1"),
+        (
+            f"{ZOO}:Segment.stretch",
+            {},
+            InputError,
+            r"is a method: make an object in .*, and name its own, .*implementations.py:OBJECT.stretch$",
+        ),
         (f"{ZOO}:stretch_nowhere", {}, InputError, "there is no function stretch_nowhere; there are "),
         (f"{ZOO}:bending_half", {"order": "x0,x1,x2,u1"}, InputError, "u2 is missing"),
         (f"{ZOO}:bending_half", {"order": "x0,x1,x2,u1,u2,u2"}, InputError, "u2 comes twice"),

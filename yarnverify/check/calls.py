@@ -156,6 +156,12 @@ def manner(
     star = any(a.kind is a.VAR_KEYWORD for a in arguments)
     named = [a for a in arguments if a.kind in (a.POSITIONAL_OR_KEYWORD, a.KEYWORD_ONLY, a.POSITIONAL_ONLY)]
 
+    if named and named[0].name == "self":
+        place, _, path = where.rpartition(":")
+        raise InputError(
+            f"{where}: is a method: make an object in {place}, and name its own, {place}:OBJECT.{path.split('.')[-1]}"
+        )
+
     def value_of(argument: inspect.Parameter) -> str | None:
         return argument.name if argument.name in values else by_likeness.get(alike(argument.name))
 
@@ -170,6 +176,7 @@ def manner(
             f"this energy ({', '.join(values)}); say what {'it is' if few else 'they are'}: "
             + " ".join(f"--with {name}=FORMULA" for name in strange)
             + ("" if by_name else f"; {named[0].name} gets the whole state")
+            + ", or write a function of those names around it"
         )
     for argument in rest:
         meant = value_of(argument)
@@ -258,6 +265,8 @@ def flattened(value: Any, layout: str, n: int, what: str) -> Array:
         value = value.detach().cpu()
     elif hasattr(value, "numpy") and not isinstance(value, np.ndarray):  # Warp
         value = value.numpy()
+    elif hasattr(value, "toarray"):  # sparse
+        value = value.toarray()
     if value is None:
         raise ValueError("it returns nothing")
     array = np.asarray(value)
