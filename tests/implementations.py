@@ -545,3 +545,15 @@ class Segment:
 
 
 segment = Segment(2.0)
+
+
+def stretch_of_points_and_slides(x: Any, u: Any, k_s: Any) -> Any:
+    """Points (2, 3) and sliding coordinates (2,), and results of the same shapes."""
+    first, second, third, fourth = stretch_forces_in_a_row(x[0], x[1], u[0], u[1], np.float64(k_s))
+    energy = k_s * (np.linalg.norm(x[1] - x[0]) - u[1] + u[0]) ** 2 / (2 * (u[1] - u[0]))
+    return energy, -np.array([first, second]), -np.array([third, fourth])
+
+
+def stretch_of_points_backwards(x: Any, u: Any, k_s: Any) -> Any:
+    energy, points, slides = stretch_of_points_and_slides(x[::-1], u[::-1], k_s)
+    return energy, points[::-1], slides[::-1]

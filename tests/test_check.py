@@ -82,6 +82,8 @@ def test_kernels_of_the_package_pass(energy: str, variant: str) -> None:
         ("stretch_forces_by_name", {}),
         ("stretch_F", {}),
         ("stretch_sparse", {}),
+        ("stretch_of_points_and_slides", {}),
+        ("stretch_of_points_backwards", {"order": "x1,x0,u1,u0"}),
         ("segment.stretch", {"energy": "stretch", "fix": ("k_s=2",)}),
         ("gravity_by_name", {"regimes": ONE}),
         (

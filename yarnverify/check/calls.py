@@ -19,6 +19,7 @@ from yarnverify.errors import InputError, NotRunError
 
 Array = NDArray[Any]
 Function = Callable[..., Any]
+_SLIDING = ("u", "us", "s", "sliding")  # how an array of all sliding coordinates is called
 TRIED = 5  # states of a first batch: a number that no row or axis has
 
 
@@ -122,15 +123,23 @@ class Manner:
         Name of each argument to the name of the value that it gets.
     positions
         Values passed after the state, in order, where the function does not say what it calls them.
+    points
+        How many points come first as an array (points, 3), the sliding coordinates following as another; 0 if all are one.
     """
 
     by_name: bool
     keywords: Mapping[str, str]
     positions: tuple[str, ...] = ()
+    points: int = 0
 
 
 def manner(
-    function: Function, unknowns: Sequence[str], values: Sequence[str], parameters: Sequence[str], where: str
+    function: Function,
+    unknowns: Sequence[str],
+    values: Sequence[str],
+    parameters: Sequence[str],
+    where: str,
+    points: int = 0,
 ) -> Manner:
     """How a function takes its arguments, from its signature.
 
@@ -140,6 +149,8 @@ def manner(
         What is called, and its name for messages.
     unknowns, values, parameters
         Names of unknowns; of everything that there is a value for; of the parameters that the energy has.
+    points
+        How many points come before the other unknowns, where there are both.
 
     Raises
     ------
@@ -166,7 +177,8 @@ def manner(
         return argument.name if argument.name in values else by_likeness.get(alike(argument.name))
 
     by_name = any(value_of(a) in unknowns for a in named) or (bool(named) and value_of(named[0]) is not None)
-    rest = named if by_name else named[1:]
+    split = points if not by_name and len(named) > 1 and named[1].name.lower() in _SLIDING else 0
+    rest = named if by_name else named[2 if split else 1 :]
     keywords, positions = {}, []
     strange = [a.name for a in rest if value_of(a) is None and a.default is a.empty]
     if strange:
@@ -191,7 +203,7 @@ def manner(
         keywords |= {name: name for name in parameters if name not in taken}
     if not by_name and any(a.kind is a.VAR_POSITIONAL for a in arguments) and not keywords:
         positions = list(parameters)
-    return Manner(by_name, keywords, tuple(positions))
+    return Manner(by_name, keywords, tuple(positions), split)
 
 
 @dataclass(frozen=True)
@@ -222,10 +234,12 @@ class Call:
         def shaped(array: Array) -> Any:
             part = np.array(array[where])
             if layout == "single":
-                return made(part[0] if part.ndim == 2 else part[0][()])
-            return made(np.ascontiguousarray(part.T) if layout == "component" else part)
+                return made(part[0] if part.ndim >= 2 else part[0][()])
+            return made(np.ascontiguousarray(np.moveaxis(part, 0, -1)) if layout == "component" else part)
 
-        state = () if self.manner.by_name else (shaped(q),)
+        at = 3 * self.manner.points
+        whole = (q[:, :at].reshape(len(q), -1, 3), q[:, at:]) if at else (q,)
+        state = () if self.manner.by_name else tuple(shaped(part) for part in whole)
         positions = [shaped(values[name]) for name in self.manner.positions]
         return self.function(
             *state, *positions, **{key: shaped(values[name]) for key, name in self.manner.keywords.items()}
@@ -285,6 +299,18 @@ def flattened(value: Any, layout: str, n: int, what: str) -> Array:
 def _forces(function: str) -> bool:
     """Whether a function calls itself a force: ``stretch_force``, ``Stretch_F``."""
     return "force" in function.lower() or "F" in function.split("_")
+
+
+def joined(parts: Mapping[str, Array], points: int, rows: int) -> dict[str, Array]:
+    """Answers without names in which one for the points, followed by one for the other unknowns, is a single one."""
+    found: dict[str, Array] = {}
+    for name, part in parts.items():
+        last = next(reversed(found), "")
+        if name[0] == "#" == last[:1] and (found[last].shape[1], part.shape[1]) == (3 * points, rows - 3 * points):
+            found[last] = np.hstack([found[last], part])
+        else:
+            found[name] = part
+    return found
 
 
 def guessed(

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from yarnverify.check.calls import TRIED, Call, answers, flattened, guessed, load, makers, manner
+from yarnverify.check.calls import TRIED, Call, answers, flattened, guessed, joined, load, makers, manner
 from yarnverify.check.conventions import LAYOUTS
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.files import write_record
@@ -72,8 +72,9 @@ def run_python(task: Task) -> None:
     rows = q.shape[1]
     functions = load(target, [label for label, _ in task.task["pieces"]])
     unknowns, parameters = task.task["unknowns"], task.task["parameters"]
+    points = task.task["points"]
     calls = [
-        Call(function, manner(function, unknowns, list(task.values), parameters, target), name)
+        Call(function, manner(function, unknowns, list(task.values), parameters, target, points), name)
         for name, function in functions.items()
     ]
     said = task.task["returns"]
@@ -88,7 +89,7 @@ def run_python(task: Task) -> None:
                 found[name] = flattened(part, layout, where.stop - where.start, name.replace("#", "answer "))
                 if getattr(part, "dtype", None) is not None and str(part.dtype).endswith("float32"):
                     kind = "float32"
-        return found, kind
+        return (joined(found, points, rows) if calls[0].manner.points else found), kind
 
     def fits(found: dict[str, Array]) -> list[str]:
         sizes = [(name, part.shape[1]) for name, part in found.items()]

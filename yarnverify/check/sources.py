@@ -80,6 +80,7 @@ def called(
         "returns": [output.name for output in known] if library else returns,
         "sizes": {output.name: output.size for output in known},
         "pieces": [(label, rows.stop - rows.start) for label, rows in setting.cases.labels],
+        "points": _points_first([row.label for row in setting.rows]),
         "layout": options.layout,
         "dtype": setting.cases.dtype,
     }
@@ -114,6 +115,13 @@ def called(
 
     positions = {name: values[name] for name in setting.parameters} if library else {}
     return ran, convention, Again(run, bool(ran.decided.get("by_name")), q, positions)
+
+
+def _points_first(labels: Sequence[str]) -> int:
+    """How many whole points come first, all other rows being scalars; 0 where the rows are not of that kind."""
+    first = [label.endswith((".x", ".y", ".z")) for label in labels]
+    count = sum(first)
+    return count // 3 if 0 < count < len(labels) and all(first[:count]) else 0
 
 
 def _manner(layout: str) -> str:
