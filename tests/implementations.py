@@ -8,7 +8,6 @@ import time
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_array
 
 from yarnverify.kernels.accurate import bending, shear, stretch
 from yarnverify.kernels.printed import bending as printed
@@ -85,6 +84,8 @@ def stretch_forces_in_a_row(x0: Any, x1: Any, u0: Any, u1: Any, k_s: Any) -> Any
 
 def stretch_sparse(q: Any, k_s: float) -> Any:
     """As assembled from triplets."""
+    from scipy.sparse import coo_array
+
     _, g, h = _of(stretch, q[:, None], k_s=k_s)
     rows, columns = np.nonzero(h[..., 0] == h[..., 0])
     return {"force": -g[:, 0], "jacobian": coo_array((-h[rows, columns, 0], (rows, columns)), shape=(8, 8))}

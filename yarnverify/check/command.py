@@ -148,8 +148,9 @@ def _judged(
             checked.hints = argument_hint(convention, cases, again, said)
         if again is not None and unknown and not checked.hints:
             checked.hints = order_hint(convention, cases, again)
-        wrong = [judge.formula.laws.of(block) for block, diagnosis in found if diagnosis.status == "wrong"]
-        if wrong and all(law is not None and law.text.startswith(("takes", "leaves")) for law in wrong):
+        wrong = [(block, diagnosis) for block, diagnosis in found if diagnosis.status == "wrong"]
+        laws = [judge.formula.laws.of(block) for block, _ in wrong] if all(d.factor is None for _, d in wrong) else []
+        if laws and all(law is not None and law.text.startswith(("takes", "leaves")) for law in laws):
             checked.hints.append(
                 "if that law is meant: yarnverify init, declare it there, and check with --energy against it"
             )

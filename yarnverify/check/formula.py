@@ -94,17 +94,18 @@ class Formula:
     def mistake(self, block: Block, at: Array) -> Mistake:
         """What a block is instead of what it should be; a wrong sign besides another mistake is seen through."""
         computed, true = block.computed[:, at], block.true[:, at]
-        law = self.laws.of(block)
+        live = np.abs(true).max(axis=0) > 0
+        where = np.flatnonzero(at)[live]
+        found = ratio(computed[:, live], true[:, live], self.tolerance) if live.any() and np.any(computed) else None
+        known = None if found is None else factor(found, {}, self.tolerance)
+        law = self.laws.of(block) if known is None else None
         if law is not None:
             return _signed(law.text, law.sign)
-        live = np.abs(true).max(axis=0) > 0
         if not np.any(computed):
             return Mistake("is zero, as if left out")
         if not live.any():
             return Mistake("is not zero, as it should be")
-        where = np.flatnonzero(at)[live]
-        found = ratio(computed[:, live], true[:, live], self.tolerance)
-        known = self._factor(found, where)
+        known = known or self._factor(found, where)
         if known is not None and known.is_sign and block.kind == "E" and (text := self.laws.exchanged):
             return Mistake(text, known, -1)
         if known is not None:
