@@ -19,6 +19,10 @@ from yarnverify.generation import generate_kernels
 from yarnverify.kernels.inputs import ElementError
 from yarnverify.library import Shelf
 from yarnverify.project import project
+from yarnverify.simulation.fabric import yarn
+from yarnverify.simulation.setting import Moving, Static
+from yarnverify.simulation.tables import table
+from yarnverify.simulation.terms import Term
 from yarnverify.source import Source
 from yarnverify.symbolic.court import Verdict
 from yarnverify.symbolic.declare import (
@@ -356,3 +360,14 @@ def test_kernels_of_an_older_energy_are_told(
         status, out, _ = run(*command)
         assert status == 1 and "The kernels are not what the energies give by now" in out
         assert out.count("yarnverify generate edited") == 1
+
+
+def test_a_scene_does_not_take_positions_for_velocities(folder: Path) -> None:
+    fabric = yarn(0.1, 2)
+    wind = kernel("accurate", "drag", folder)
+    term = Term(wind, table(wind, {"v0": [0, 1, 2]}), {"w": (0.0, 0.0, 0.0), "c": 1.0})
+    with pytest.raises(InputError, match="drag is of velocities: a scene has energies of positions"):
+        Static(fabric, [term], fabric.positions([1]))
+    mass: Any = [1e-3]
+    with pytest.raises(InputError, match="kinetic is a Term, such as"):
+        Moving(fabric, [], fabric.positions([1]), mass, 1.0, 0.1)

@@ -87,6 +87,8 @@ class Kernel:
     even
         Where the energy is smooth though its only length is zero, as a law of the square of a length is: the first rows of its
         two ends.
+    rates
+        Whether some rows are velocities.
     promise
         How large errors are, where the variant does not say it: a few ``units`` in the last place, no more than the
         ``condition`` of the state explains, or ``none`` for formulas that lose digits near singular states.
@@ -102,6 +104,7 @@ class Kernel:
     promise: Literal["units", "condition", "none"] = "units"
     factors: int = MOST_FACTORS
     even: tuple[int, int] | None = None
+    rates: bool = False
     loops: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # compiled ones, as they are made
     _tapes: dict[Any, Tape] = field(default_factory=dict, compare=False, repr=False)
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from yarnverify.errors import InputError
 from yarnverify.simulation.assembly import System, Term
 from yarnverify.simulation.cloth import Fabric
 from yarnverify.simulation.dynamics import Motion, Scheme
@@ -150,6 +151,9 @@ class Static:
     view: Any = "oblique"
     solids: Sequence[Ball] = ()
 
+    def __post_init__(self) -> None:
+        _check(self.terms)
+
 
 @dataclass(frozen=True, eq=False)
 class Moving:
@@ -196,6 +200,22 @@ class Moving:
     colour: str | None = None
     view: Any = "oblique"
     solids: Sequence[Ball] = ()
+
+    def __post_init__(self) -> None:
+        _check(self.terms)
+        if not isinstance(self.kinetic, Term):
+            raise InputError(
+                f"kinetic is a Term, such as Term(kinetic, segments(fabric, kinetic), {{'rho': 1e-4}}), not {self.kinetic!r}"
+            )
+
+
+def _check(terms: Sequence[Term]) -> None:
+    """Refuse what is no energy of a configuration, whose velocities would be read from positions."""
+    for term in terms:
+        if term.kernel.KERNEL.rates:
+            raise InputError(
+                f"{term.name} is of velocities: a scene has energies of positions, and dissipates nothing by others"
+            )
 
 
 Setting = Static | Moving

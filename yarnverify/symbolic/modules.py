@@ -203,6 +203,7 @@ def module_text(
         "promise": promise(variant, found, LIBRARY & set(tape)),
         "numbers": numbers(variant, found),
         "factors": most_factors(found),
+        "rates": any(unit != "m" for unit in energy.units),
         "even": even_ends(energy, found),
         "public": (
             ("energy", "(n,)", "Energy of each element", energy.unit, "Array"),

@@ -146,6 +146,7 @@ KERNEL = runtime.Kernel(
     ),
     portable=True,
     numbers="words",
+    rates=True,
     promise="condition",
 )
 

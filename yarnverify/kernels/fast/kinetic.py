@@ -145,6 +145,7 @@ KERNEL = runtime.Kernel(
     ),
     portable=True,
     numbers="float",
+    rates=True,
 )
 
 

@@ -145,6 +145,7 @@ KERNEL = runtime.Kernel(
     ),
     portable=True,
     numbers="double-double",
+    rates=True,
 )
 
 
