@@ -149,8 +149,10 @@ class Evaluation:
             return self._atan2(y, x)
         if op == "call" and (plain := unfolded(expr)) is not None:
             return self._value(plain, jets)
-        if op == "call" and expr.value == "cos" and not self.numbers.exact and (known := self._cosine_of(expr.args[0])):
-            return self._value(known, jets)
+        if op == "call" and expr.value == "cos" and jets and not self.numbers.exact:
+            known = self._cosine_of(expr.args[0])  # which has derivatives where the angle has none
+            if known is not None:
+                return self._value(known, jets)
         if op == "call" and expr.value != "arccos":
             sine, cosine = self._circle(expr.args[0], jets)
             return {"sin": lambda: sine, "cos": lambda: cosine, "tan": lambda: sine / _nonzero(cosine)}[
