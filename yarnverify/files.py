@@ -52,10 +52,15 @@ def as_seen(path: Path) -> Path:
     return full.relative_to(Path.cwd()) if full.is_relative_to(Path.cwd()) else path
 
 
+def write_bytes(data: bytes, path: Path) -> None:
+    """Write data, whole or not at all."""
+    with whole(path) as part:
+        part.write_bytes(data)
+
+
 def write_text(text: str, path: Path) -> None:
     """Write a text in UTF-8, whole or not at all."""
-    with whole(path) as part:
-        part.write_text(text, encoding="utf-8")
+    write_bytes(text.encode("utf-8"), path)
 
 
 def write_record(record: Mapping[str, Any], path: Path) -> None:

@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from yarnverify.errors import InputError, NotRunError, why
-from yarnverify.files import as_seen
+from yarnverify.errors import InputError, NotRunError
+from yarnverify.files import as_seen, write_text
 from yarnverify.library import declared_files, known
 from yarnverify.project import Project, project
 
@@ -44,7 +44,6 @@ def settle_files(folder: Path, texts: dict[str, str], check: bool, stale: list[s
     again
         The command that writes them.
     """
-
     outcome = Outcome()
     for name, text in texts.items():
         path = folder / name
@@ -62,11 +61,7 @@ def settle_files(folder: Path, texts: dict[str, str], check: bool, stale: list[s
             )
             outcome.lines += list(shown) or [f"{seen}: line endings differ"]
             continue
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(text.encode("utf-8"))
-        except OSError as error:
-            raise NotRunError(f"{path}: cannot write: {why(error)}") from None
+        write_text(text, path)
         outcome.lines.append(f"{seen}: written")
     for name in stale:
         outcome.differs |= check

@@ -10,7 +10,7 @@ from yarnverify.accuracy.record import grown, make_record, missed_targets, read_
 from yarnverify.accuracy.sweep import PROFILES, executor_named, finish, plan, run, state_folder
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.files import write_text
-from yarnverify.generation import Outcome
+from yarnverify.generation import Outcome, out_of_date
 from yarnverify.project import Project, project
 
 RECORD = Path("records") / "accuracy.json"
@@ -67,7 +67,6 @@ def accuracy(
     InputError, NotRunError
         For names that are not there, records that cannot be read, executors that do not answer, files that cannot be written.
     """
-    from yarnverify.generation import out_of_date
     from yarnverify.report.accuracy import accuracy_table
 
     of = of or project()

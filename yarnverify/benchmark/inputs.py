@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from yarnverify.benchmark.peers.walk import functions_of, scalar_of, values_of, vector_of
 from yarnverify.benchmark.ways import count_of_parameters, degrees_of_freedom
 from yarnverify.symbolic.declare import Energy
+from yarnverify.symbolic.formulas import sides_of
 from yarnverify.symbolic.tree import Expr
 
 Array = NDArray[Any]
@@ -69,7 +70,7 @@ def error_states(energy: Energy, n: int = 32, seed: int = 0) -> dict[str, Inputs
     found = {"mixed": _mixed(energy, n, draw)}
     for name, size in HARD.items():
         found[f"{name} from rest"] = _near_rest(energy, n, draw, partial(np.full, fill_value=size))
-    angle = next(_angles(energy.expression), None)
+    angle = next(filter(None, map(sides_of, energy.expression.walk())), None)
     for name, size in HARD.items():
         folded = None if angle is None else _folded(energy, angle, _mixed(energy, n, draw), size, draw)
         if folded is not None:
@@ -130,16 +131,6 @@ def _rotations(n: int, draw: np.random.Generator) -> Array:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
-
-
-def _angles(expr: Expr) -> Iterator[tuple[Expr, Expr]]:
-    """The two vectors of each angle in a tree."""
-    for node in expr.walk():
-        if node.op == "call" and node.value == "arccos" and node.args[0].op == "mul" and len(node.args[0].args) == 2:
-            left, right = node.args[0].args
-            left = left.args[0] if left.op == "transpose" else left
-            if left.op == right.op == "frac":
-                yield left.args[0], right.args[0]
 
 
 def _folded(

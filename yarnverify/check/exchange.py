@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from yarnverify.check.conventions import ALIASES, Convention
 from yarnverify.check.formats import States, format_of, numbers, read_csv
-from yarnverify.errors import InputError, NotRunError, why
+from yarnverify.errors import InputError, why
+from yarnverify.files import write_bytes
 
 Array = NDArray[Any]
 
@@ -53,10 +54,7 @@ def write_inputs(
     """
     kind = format_of(path, "--write-inputs")
     states = States(energy, key_of(q, values), convention.labels, tuple(tags), q, values, convention.dtype)
-    try:
-        path.write_bytes(kind.written(states))
-    except OSError as error:
-        raise NotRunError(f"{path}: cannot write: {why(error)}") from None
+    write_bytes(kind.written(states), path)
 
 
 def read_results(

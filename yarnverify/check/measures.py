@@ -7,7 +7,7 @@ from typing import Any
 
 from yarnverify.accuracy.shape import shape_of
 from yarnverify.check.cases import Cases
-from yarnverify.symbolic.formulas import cos, sin, tan
+from yarnverify.symbolic.formulas import cos, sides_of, sin, tan
 from yarnverify.symbolic.tree import PI, Expr, rebuild
 
 Parts = tuple[Expr, ...]
@@ -30,12 +30,8 @@ def _elongation(node: Expr) -> Parts | None:
 
 def _angle(node: Expr) -> Parts | None:
     """The angle between two edges: itself and these."""
-    if node.op != "call" or node.value != "arccos" or node.args[0].op != "mul" or len(node.args[0].args) != 2:
-        return None
-    first, second = node.args[0].args
-    if first.op != "transpose" or not all(part.op == "frac" for part in (first.args[0], second)):
-        return None
-    return node, first.args[0].args[0], second.args[0]
+    sides = sides_of(node)
+    return None if sides is None else (node, *sides)
 
 
 def _deviation(node: Expr) -> Parts | None:

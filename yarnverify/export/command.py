@@ -6,10 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from yarnverify.check.cases import energy_named
-from yarnverify.errors import InputError, NotRunError, why
+from yarnverify.errors import InputError
 from yarnverify.export.formulas import latex_text
 from yarnverify.export.vectors import golden_vectors
 from yarnverify.export.writing import c_header, c_test, json_text, mat, npz
+from yarnverify.files import write_bytes
 from yarnverify.library import derivations
 
 _PROMISES_NOTHING = (
@@ -64,10 +65,6 @@ def export(
     )
     lines = []
     for file, (data, meaning) in files.items():
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-            (out / file).write_bytes(data)
-        except OSError as error:
-            raise NotRunError(f"{out / file}: cannot write: {why(error)}") from None
+        write_bytes(data, out / file)
         lines.append(f"{out / file}: {meaning}")
     return lines if keeps else [*lines, _PROMISES_NOTHING.format(name=name)]

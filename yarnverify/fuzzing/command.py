@@ -11,6 +11,7 @@ from typing import Any
 from yarnverify.accuracy.cells import has_kernel
 from yarnverify.errors import InputError, NotRunError
 from yarnverify.fuzzing.search import ENERGIES, Search, search
+from yarnverify.generation import out_of_date
 from yarnverify.project import Project, project
 from yarnverify.symbolic.declare import load_declarations
 
@@ -65,8 +66,6 @@ def fuzz(
         if searches[-1].interrupted:
             break
     lines = [line for one in searches for line in _lines(one)]
-    from yarnverify.generation import out_of_date
-
     lines += out_of_date(of)
     skipped = names[len(searches) :]
     if skipped:

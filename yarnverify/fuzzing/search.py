@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event
+from traceback import walk_stack
 from typing import Any
 
 from hypothesis import HealthCheck, Phase, Verbosity, given, seed, settings, target
@@ -213,13 +214,9 @@ def _alarm(seconds: float, rung: Event) -> Iterator[None]:
 
     def ring(number: int, frame: Any) -> None:
         rung.set()
-        while (
-            frame is not None
-        ):  # of an error within the callback by which Hypothesis times the collector, Python prints a trace
-            if frame.f_code.co_name == "gc_callback":
-                return
-            frame = frame.f_back
-        raise _Stop
+        # of an error within the callback by which Hypothesis times the collector, Python prints a trace
+        if all(caller.f_code.co_name != "gc_callback" for caller, _ in walk_stack(frame)):
+            raise _Stop
 
     before = signal.signal(signal.SIGALRM, ring)
     signal.setitimer(signal.ITIMER_REAL, seconds, 1.0)  # again: a stop within a callback is lost

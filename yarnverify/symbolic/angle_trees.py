@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import sympy as sp
 
+from yarnverify.symbolic.formulas import sides_of
 from yarnverify.symbolic.steps import Check
 from yarnverify.symbolic.tree import PI, Expr
 from yarnverify.symbolic.vector_angles import Stepwise, VectorAngle
@@ -73,16 +75,9 @@ class VectorAngles:
                 return None
             self.sines.add(expr.args[0])
             return self._made(a, b, 1)
-        if expr.value != "arccos":
-            return None
-        (cosine,) = expr.args
-        sign = -1 if cosine.op == "neg" else 1
-        match cosine.args[0] if sign < 0 else cosine:
-            case Expr(op="mul", args=(Expr(op="transpose", args=(first,)), second)):
-                one, other = _direction(first), _direction(second)
-                if one is not None and other is not None:
-                    return self._made(one, other, sign)
-        return None
+        opposite = expr.args[0].op == "neg"
+        sides = sides_of(replace(expr, args=expr.args[0].args) if opposite else expr)
+        return None if sides is None else self._made(*sides, -1 if opposite else 1)
 
     def _compared(self, first: Expr, second: Expr) -> Any:
         """An angle less a right angle, or pi less an angle."""
@@ -133,10 +128,3 @@ class VectorAngles:
             square = angle.square_of(str(base.value), half)
         odd = self._reading.value(base) if exponent % 2 else 1
         return square ** (exponent // 2) * odd
-
-
-def _direction(expr: Expr) -> Expr | None:
-    """The vector that a tree is the direction of."""
-    if expr.op == "frac" and expr.args[1] == Expr("norm", (expr.args[0],)):
-        return expr.args[0]
-    return None

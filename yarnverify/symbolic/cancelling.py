@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import sympy as sp
@@ -71,10 +72,7 @@ def _sign(tree: Expr, positive: set[Name]) -> int:
         case "add":
             return signs[0] if len(set(signs)) == 1 else 0
         case "mul" | "frac":
-            found = 1
-            for sign in signs:
-                found *= sign
-            return found
+            return math.prod(signs)
         case "pow":
             return 1 if int(str(tree.value)) % 2 == 0 else signs[0]
         case "call":

@@ -78,10 +78,7 @@ class Steps(Components):
     def log(self, value: Any) -> Any:
         found = logarithm_of(self.steps.get(value, value))
         if isinstance(found, log_ratio):
-            ratio, excess = found.args
-            found = super().hold(log_ratio(self.hold(ratio), self.hold(excess)))
-            self.rules[found] = lambda slope, row: slope(ratio, row) / ratio
-            return found
+            return log_ratio(*map(self.hold, found.args))
         return super().log(value)
 
     def _without_cancellation(self, total: Any) -> Any:
@@ -99,16 +96,8 @@ class Steps(Components):
         found = sum_of(opened)
         if found == opened:
             return self.angles.without_cancellation(total)
-        calls = {call: self._function(call) for call in sorted(found.atoms(expm1, sinh), key=str)}
+        calls = {call: super(Steps, self).hold(call) for call in sorted(found.atoms(expm1, sinh), key=str)}
         return found.xreplace(calls).xreplace(back)
-
-    def _function(self, call: Any) -> Any:
-        """``expm1`` or ``sinh`` as a step."""
-        symbol, argument = super().hold(call), call.args[0]
-        other = 0 if isinstance(call, expm1) else sp.exp(-argument)
-        share = 1 if other == 0 else sp.Rational(1, 2)
-        self.rules[symbol] = lambda slope, row: share * (sp.exp(argument) + other) * slope(argument, row)
-        return symbol
 
     def absolute(self, value: Any) -> Any:
         return super().absolute(self.hold(value))  # a symbol is known to be real, and so its sign to have no slope

@@ -26,13 +26,22 @@ KEPT = frozenset({"exp", "log", *SAFE})  # functions whose values keep the digit
 class expm1(sp.Function):  # type: ignore[misc]
     """``exp(x) - 1``."""
 
+    def fdiff(self, argindex: int = 1) -> Any:
+        return sp.exp(self.args[0])
+
 
 class sinh(sp.Function):  # type: ignore[misc]
     """``(exp(x) - exp(-x))/2``."""
 
+    def fdiff(self, argindex: int = 1) -> Any:
+        return (sp.exp(self.args[0]) + sp.exp(-self.args[0])) / 2
+
 
 class log_ratio(sp.Function):  # type: ignore[misc]
-    """``log(r)`` of r and r - 1."""
+    """``log(r)`` of r and r - 1; its derivative is taken by r."""
+
+    def fdiff(self, argindex: int = 1) -> Any:
+        return 1 / self.args[0] if argindex == 1 else sp.S.Zero
 
 
 def vanishes(law: Any) -> bool:
