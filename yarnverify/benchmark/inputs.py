@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from yarnverify.benchmark.peers.walk import functions_of, scalar_of, values_of, vector_of
 from yarnverify.benchmark.ways import count_of_parameters, degrees_of_freedom
 from yarnverify.symbolic.declare import Energy
-from yarnverify.symbolic.formulas import sides_of
+from yarnverify.symbolic.functions import sides_of
 from yarnverify.symbolic.tree import Expr
 
 Array = NDArray[Any]

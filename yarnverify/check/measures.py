@@ -7,7 +7,8 @@ from typing import Any
 
 from yarnverify.accuracy.shape import shape_of
 from yarnverify.check.cases import Cases
-from yarnverify.symbolic.formulas import cos, sides_of, sin, tan
+from yarnverify.symbolic.formulas import cos, sin, tan
+from yarnverify.symbolic.functions import sides_of
 from yarnverify.symbolic.tree import PI, Expr, rebuild
 
 Parts = tuple[Expr, ...]

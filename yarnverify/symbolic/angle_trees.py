@@ -8,7 +8,7 @@ from typing import Any
 
 import sympy as sp
 
-from yarnverify.symbolic.formulas import sides_of
+from yarnverify.symbolic.functions import sides_of
 from yarnverify.symbolic.steps import Check
 from yarnverify.symbolic.tree import PI, Expr
 from yarnverify.symbolic.vector_angles import Stepwise, VectorAngle

@@ -31,26 +31,6 @@ def angle(a: Expr, b: Expr) -> Expr:
     return Expr("call", (Expr("mul", (unit(a).T, unit(b))),), "arccos")
 
 
-def sides_of(angle: Expr) -> tuple[Expr, Expr] | None:
-    """The two vectors of an ``angle``; None for any other tree."""
-    match angle:
-        case Expr(
-            op="call",
-            value="arccos",
-            args=(
-                Expr(
-                    op="mul",
-                    args=(
-                        Expr(op="transpose", args=(Expr(op="frac", args=(a, size_a)),)),
-                        Expr(op="frac", args=(b, size_b)),
-                    ),
-                ),
-            ),
-        ) if (size_a, size_b) == (length(a), length(b)):
-            return a, b
-    return None
-
-
 def dot(a: Expr, b: Expr) -> Expr:
     """Scalar product of two vectors."""
     return Expr("mul", (as_expr(a).T, as_expr(b)))

@@ -14,6 +14,26 @@ def is_turn(expr: Expr) -> bool:
     return expr.op == "call" and expr.value == "atan2" and expr.args[0].op != "norm"
 
 
+def sides_of(angle: Expr) -> tuple[Expr, Expr] | None:
+    """The two vectors that a tree is the angle between; None for any other tree."""
+    match angle:
+        case Expr(
+            op="call",
+            value="arccos",
+            args=(
+                Expr(
+                    op="mul",
+                    args=(
+                        Expr(op="transpose", args=(Expr(op="frac", args=(a, size_a)),)),
+                        Expr(op="frac", args=(b, size_b)),
+                    ),
+                ),
+            ),
+        ) if (size_a, size_b) == (Expr("norm", (a,)), Expr("norm", (b,))):
+            return a, b
+    return None
+
+
 def unfolded(expr: Expr) -> Expr | None:
     """A function by arc cosine, sine, cosine, exponential and logarithm alone; None for these themselves and for ``tan``.
 
