@@ -21,8 +21,8 @@ settings.load_profile("ci")
 # Coverage is asked of ``symbolic``. To trace a test makes it two or three times as slow, so not all are traced but those files
 # that between them go everywhere there; the others (proofs, mutants, repairs) go the same ways many times.
 TRACED = (
-    "cli", "declare", "derive", "document", "export", "forward", "library", "normal", "output", "own", "reader", "rewritings",
-    "sides",
+    "cli", "declare", "derive", "document", "export", "first_energies", "forward", "library", "normal", "output", "own",
+    "reader", "rewritings", "sides", "vector_angles",
 )  # fmt: skip
 
 
